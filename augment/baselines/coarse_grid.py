@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.baselines import rule_placer
-from augment.baselines.placing_ground import build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference, overlap
 from augment.scene import intent as wish
@@ -161,8 +160,8 @@ class _Places:
             index = int(rng.choice(allowed))
             x_m, y_m = self._points[index].round(3).tolist()
             pose = Pose(x_m=x_m, y_m=y_m, heading_rad=round(self._headings[index], 5))
-            vehicle = build_agent(
-                AgentType.VEHICLE, pose, self._lane_ids[index], speed_mps=code.speed_mps
+            vehicle = TrafficAgent.at(
+                AgentType.VEHICLE, pose, lane_id=self._lane_ids[index], speed_mps=code.speed_mps
             )
             if not any(overlap(vehicle.box, other.box).depth_m > 0.0 for other in others):
                 return vehicle

@@ -10,7 +10,7 @@ from statistics import fmean
 import numpy as np
 
 from augment.baselines.placed_motions import give_motion
-from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.baselines.placing_ground import PlacingGround
 from augment.checks.wish_places import find_across, is_exact
 from augment.checks.wish_shapes import Placement, lay_out, ring_radius_m
 from augment.errors import CannotPlace
@@ -77,10 +77,10 @@ def _walker(
         walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
     end = begin + (end - begin) * (walked_m / length_m)
     (x_m, y_m), (to_x_m, to_y_m) = begin.tolist(), end.tolist()
-    return build_agent(
+    return TrafficAgent.at(
         AgentType.PEDESTRIAN,
         Pose(x_m=x_m, y_m=y_m, heading_rad=math.atan2(to_y_m - y_m, to_x_m - x_m)),
-        ground.graph.under(x_m, y_m),
+        lane_id=ground.graph.under(x_m, y_m),
         speed_mps=round(request.speed_mps or walked_m / WALK_S, 2),
         walk_to_m=(to_x_m, to_y_m),
     )
@@ -116,7 +116,7 @@ def place_cones(
         place = _at(ground, lane, spot)
         on_lane = abs(place.d_m) <= ground.lane(place).width_m / 2.0
         lane_id = place.lane_id if on_lane else ground.lane_at(place.pose)
-        added.append(build_agent(kind, place.pose, lane_id))
+        added.append(TrafficAgent.at(kind, place.pose, lane_id=lane_id))
     return tuple(added)
 
 

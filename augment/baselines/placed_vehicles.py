@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from augment.baselines.placed_motions import find_arm, give_motion, is_on_other_arm
-from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.baselines.placing_ground import PlacingGround
 from augment.checks.wish import BEARINGS_RAD
 from augment.checks.wish_places import EDGE_GAP_M, find_across
 from augment.errors import CannotPlace
@@ -82,7 +82,9 @@ def place_vehicles(
         assert wish is not None
         speed_mps = request.speed_mps or 0.0
         pose, lane_id = find_arm(ground, wish.side, speed_mps, nearer_m=distance_m)
-        vehicle = build_agent(_agent_type(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
+        vehicle = TrafficAgent.at(
+            _agent_type(body), pose, _size_m(body), speed_mps=speed_mps, lane_id=lane_id
+        )
         return (give_motion(wish, ground, vehicle, rng),)
     apart_m = request.spacing.draw(rng) if request.spacing else _size_m(body)[0] + BUMPER_GAP_M
     d_m = _offset_m(request, ground, distance_m, rng)
@@ -94,12 +96,12 @@ def place_vehicles(
         centre = ground.beside(distance_m + index * apart_m, lane)
         place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
         on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
-        agent = build_agent(
+        agent = TrafficAgent.at(
             _agent_type(body),
             place.pose.turn(turn_rad),
-            place.lane_id if on_lane else None,
             _size_m(body),
             speed_mps=request.speed_mps or 0.0,
+            lane_id=place.lane_id if on_lane else None,
         )
         added.append(agent if wish is None else give_motion(wish, ground, agent, rng))
     return tuple(added)
@@ -165,7 +167,9 @@ def place_crash(
         poses = _in_a_row(request, ground, distance_m, d_m, _LOOSER[arrangement])
     kind = _agent_type(request.body)
     size_m = _size_m(request.body)
-    return tuple(build_agent(kind, pose, ground.lane_at(pose), size_m) for pose in poses)
+    return tuple(
+        TrafficAgent.at(kind, pose, size_m, lane_id=ground.lane_at(pose)) for pose in poses
+    )
 
 
 def _in_a_row(

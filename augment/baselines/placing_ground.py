@@ -17,7 +17,7 @@ from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
 from augment.scene import entities
 from augment.scene.intent import LaneChoice, Side
-from augment.scene.lane_graph import AnyLane, LanePosition
+from augment.scene.lane_graph import LanePosition
 
 _STEP_M = 0.25
 _GAP_M = 1.5
@@ -25,31 +25,6 @@ _GAP_M = 1.5
 _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
-
-
-def build_agent(
-    kind: entities.AgentType,
-    pose: Pose,
-    lane_id: str | None,
-    size_m: tuple[float, float] | None = None,
-    *,
-    speed_mps: float = 0.0,
-    walk_to_m: entities.Point | None = None,
-) -> entities.TrafficAgent:
-    """Return an agent of the kind's size, or of another length and width, its id still empty."""
-    length_m, width_m = size_m or entities.LENGTH_WIDTH_M[kind]
-    return entities.TrafficAgent(
-        id="",
-        type=kind,
-        x_m=pose.x_m,
-        y_m=pose.y_m,
-        heading_rad=pose.heading_rad,
-        length_m=length_m,
-        width_m=width_m,
-        speed_mps=speed_mps,
-        lane_id=lane_id,
-        walk_to_m=walk_to_m,
-    )
 
 
 class PlacingGround:
@@ -118,7 +93,7 @@ class PlacingGround:
             return None
         return lane.left_neighbor if side is Side.LEFT else lane.right_neighbor
 
-    def lane(self, place: LanePosition) -> AnyLane:
+    def lane(self, place: LanePosition) -> entities.AnyLane:
         """Return the lane or connector of a place."""
         return self.graph.lane(place.lane_id)
 
@@ -145,7 +120,7 @@ class PlacingGround:
 
     # Private
 
-    def _runs_along(self, lane: AnyLane, pose: Pose) -> bool:
+    def _runs_along(self, lane: entities.AnyLane, pose: Pose) -> bool:
         place = lane.centerline.project(pose.x_m, pose.y_m)
         turn_rad = abs(difference(lane.centerline.heading_at(place.s_m), pose.heading_rad))
         return place.distance_m <= _WIDEST_M + lane.width_m / 2.0 and (

@@ -16,7 +16,8 @@ from augment.geometry.frames import Box
 from augment.geometry.polyline import FloatArray
 from augment.scene import entities
 from augment.scene.ego_route import EgoRoute
-from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
+from augment.scene.entities import AnyLane
+from augment.scene.lane_graph import Beside, LaneGraph, best_aligned
 from augment.scene.motion import Expectation, Motion, Movement, find_motion, with_movers_alone
 
 SEAM_M = 0.3

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 
-from augment.baselines.placing_ground import build_agent
 from augment.baselines.rule_placer import number_agents
 from augment.checks import Finding, FindingKind, Ground
 from augment.checks.purpose import check_drive
@@ -145,4 +144,5 @@ def _put(
     x_m, y_m = route.position(ahead_m, left_m)
     heading_rad = wrap(route.heading_at(ahead_m) + turn_rad)
     pose = Pose(x_m=round(x_m, 2), y_m=round(y_m, 2), heading_rad=heading_rad)
-    return build_agent(kind, pose, route.graph.under(x_m, y_m, heading_rad), size_m)
+    lane_id = route.graph.under(x_m, y_m, heading_rad)
+    return TrafficAgent.at(kind, pose, size_m, lane_id=lane_id)

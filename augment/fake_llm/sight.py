@@ -11,18 +11,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from augment.fake_llm.wire import ChatRequest
 from augment.prompts.calls import PARAMETERS, Tools
 from augment.prompts.fill import QUOTE, read_text
 from augment.prompts.vectors import LaneFormat, scene_text, short_names, with_short_ids
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import Intent
-from augment.scene.planned_motion import PlannedMotion
+from augment.scene.planned_motion import MOTION
 from augment.variants.respondents import ModelRole
 
-_MOTION = TypeAdapter(PlannedMotion)
 _NUMBERS = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
 
 KnownTasks = Callable[[str], Sequence[tuple[Scene, Intent]]]
@@ -141,7 +138,7 @@ def read_changed_agents(prompt: str) -> list[TrafficAgent]:
         made: dict[str, Any] = dict(zip(_NUMBERS, map(float, values[:6]), strict=True))
         lane, *last = values[6:]
         if last and isinstance(last[0], dict):
-            made["motion"] = _MOTION.validate_python(last[0])
+            made["motion"] = MOTION.shape.validate_python(last[0])
         changed.append(TrafficAgent(id=name, type=AgentType(kind), lane_id=lane, **made))
     return changed
 

@@ -22,8 +22,8 @@ import numpy as np
 from augment.foreign import Doubts, FloatArray, fault_at, read_finite, read_numbers
 from augment.formats.apart import BROKEN_ZIP
 from augment.formats.reading import LONGEST_M
-from augment.geometry.frames import wrap
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent
+from augment.geometry.frames import Pose, wrap
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 
 NAME = "lctgen"
 _COLUMNS = 7
@@ -71,22 +71,13 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
     if not all(is_sized):
         notes.append(f"{is_sized.count(False)} vehicles without a size got the usual one.")
     vehicles = []
-    usual_m = LENGTH_WIDTH_M[AgentType.VEHICLE]
     for number, (row, has_size) in enumerate(zip(others.tolist(), is_sized, strict=True), start=1):
-        x_m, y_m, vx_mps, vy_mps, heading_rad, *size_m = row
-        length_m, width_m = size_m if has_size else usual_m
-        vehicles.append(
-            TrafficAgent(
-                id=f"{NAME}-{number}",
-                type=AgentType.VEHICLE,
-                x_m=x_m,
-                y_m=y_m,
-                heading_rad=wrap(heading_rad),
-                length_m=length_m,
-                width_m=width_m,
-                speed_mps=float(np.hypot(vx_mps, vy_mps)),
-            )
-        )
+        x_m, y_m, vx_mps, vy_mps, heading_rad, length_m, width_m = row
+        pose = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+        size_m = (length_m, width_m) if has_size else None
+        name, speed_mps = f"{NAME}-{number}", float(np.hypot(vx_mps, vy_mps))
+        vehicle = TrafficAgent.at(AgentType.VEHICLE, pose, size_m, id=name, speed_mps=speed_mps)
+        vehicles.append(vehicle)
     return Modification(added=tuple(vehicles)), tuple(notes)
 
 

@@ -20,6 +20,7 @@ from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats import reading
 from augment.formats.nuplan_map import city_around, open_tables
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
+from augment.scene.recording import Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,7 +151,7 @@ def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
 
 def _motion(
     base: sqlite3.Connection, token: str, doubts: Doubts
-) -> tuple[FloatArray, FloatArray, dict[str, reading.LoggedTrack]]:
+) -> tuple[FloatArray, FloatArray, dict[str, Track]]:
     """Times, the ego's states and all tracks from a lidar_pc on, which is the first step."""
     start = base.execute(_FRAME, (bytes.fromhex(token),)).fetchone()
     if start is None:

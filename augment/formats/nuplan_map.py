@@ -20,6 +20,7 @@ import shapely
 
 from augment.foreign import Doubts, FloatArray, fault_at, read_speed, read_whole
 from augment.formats.road_map import RoadMap, Segment
+from augment.formats.roads import is_far
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 
 BICYCLE_LANE = 1
@@ -158,9 +159,7 @@ class _Layers:
 
     def is_near(self, points: FloatArray, reach_m: float = REACH_M) -> bool:
         """Return whether the box around points lies within reach."""
-        local = points - self._center
-        gap = np.maximum(np.maximum(local.min(axis=0), -local.max(axis=0)), 0.0)
-        return bool(np.hypot(*gap) <= reach_m)
+        return not is_far(points - self._center, reach_m)
 
 
 def _outline(block: Any, is_geographic: bool, place: str) -> Any:
@@ -170,7 +169,10 @@ def _outline(block: Any, is_geographic: bool, place: str) -> Any:
         InvalidDocument: The geometry is broken.
     """
     try:
-        line = _longest_line(shapely.from_wkb(_well_known_binary(block)))
+        envelope = block[3] >> 1 & 7 if isinstance(block, bytes) and len(block) >= 8 else 7
+        if envelope >= len(_ENVELOPE_BYTES) or block[:2] != b"GP" or block[3] & 0x10:
+            raise ValueError("does not begin with GP, is empty, or has an unknown envelope")
+        line = _longest_line(shapely.from_wkb(block[8 + _ENVELOPE_BYTES[envelope] :]))
         points = shapely.get_coordinates(line)
         if not np.isfinite(points).all():
             raise ValueError("a point is not finite")
@@ -179,14 +181,6 @@ def _outline(block: Any, is_geographic: bool, place: str) -> Any:
     except (ValueError, shapely.errors.ShapelyError) as fault:
         raise fault_at(place, f"has a broken geometry: {fault}") from None
     return line
-
-
-def _well_known_binary(block: Any) -> bytes:
-    """The geometry without the header that a GeoPackage puts before it."""
-    envelope = block[3] >> 1 & 7 if isinstance(block, bytes) and len(block) >= 8 else 7
-    if envelope >= len(_ENVELOPE_BYTES) or block[:2] != b"GP" or block[3] & 0x10:
-        raise ValueError("does not begin with GP, is empty, or has an unknown envelope")
-    return bytes(block[8 + _ENVELOPE_BYTES[envelope] :])
 
 
 def _longest_line(geometry: Any) -> Any:

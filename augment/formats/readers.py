@@ -76,12 +76,8 @@ def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Rea
             if reader.recognises(candidate)
         ]
         others += [match for match in recognised if match[0].goes_with_others]
-        level = [
-            below
-            for candidate in level
-            if is_deep and candidate.is_dir()
-            for below in candidate.iterdir()
-        ]
+        folders = [candidate for candidate in level if is_deep and candidate.is_dir()]
+        level = [below for folder in folders for below in folder.iterdir()]
         matches = [match for match in recognised if not match[0].goes_with_others]
         matches = matches or ([] if level else others)
         if len(matches) == 1:

@@ -19,15 +19,8 @@ from augment.foreign import FASTEST_MPS, FURTHEST, Doubts, FloatArray, fault_at
 from augment.formats.road_map import RoadMap, complete_map
 from augment.formats.roads import RADIUS_M, refuse_shape, road_around, segment_centreline
 from augment.geometry.frames import Pose, wrap
-from augment.scene.entities import (
-    EGO_LENGTH_M,
-    EGO_WIDTH_M,
-    LENGTH_WIDTH_M,
-    AgentType,
-    Origin,
-    Scene,
-    TrafficAgent,
-)
+from augment.scene import entities
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording, Track, track_agent
 
@@ -86,28 +79,6 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LoggedTrack:
-    """One object.
-
-    Attributes:
-        name: Its id in the source; an order among those that are equally near.
-        length_m, width_m: What the source says, be it no size.
-        states: (T, 4): x_m, y_m, heading_rad, speed_mps in the world frame; NaN where unseen.
-    """
-
-    name: str
-    type: AgentType
-    length_m: float = 0.0
-    width_m: float = 0.0
-    states: FloatArray
-
-    @property
-    def has_size(self) -> bool:
-        """True if its size can be used."""
-        return _is_size(self.length_m, self.width_m)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Log:
     """One part of a recording: what moved, the map, and where it comes from.
 
@@ -115,6 +86,8 @@ class Log:
         times_s: (T,) ascending.
         ego: (T, 4), as a track's states, of the ego's geometric centre.
         ego_size_m: Its length and width.
+        tracks: In the world frame, by their ids in the source, which order those that are equally
+            near; sizes are what it says, be it none.
         map_at: The map with the lights of a frame, as far as the ego can see at least.
         world: What the source's frame is called.
         title: The data set and the part of it.
@@ -129,7 +102,7 @@ class Log:
     times_s: FloatArray
     ego: FloatArray
     ego_size_m: tuple[float, float]
-    tracks: Sequence[LoggedTrack]
+    tracks: Sequence[Track]
     map_at: Callable[[int], RoadMap]
     world: str
     title: str
@@ -176,7 +149,7 @@ class Log:
             name=name,
             ego=_ego(self, frame),
             traffic_side=road.traffic_side,
-            origin=Origin.at(origin, frame=self.world),
+            origin=entities.Origin.at(origin, frame=self.world),
             provenance=f"{self.title}, step {frame} of {len(self.times_s)}; {self.licence}",
             agents=tuple(
                 _agent(track) for track in tracks if np.hypot(*track.states[0, :2]) <= RADIUS_M
@@ -188,7 +161,7 @@ class Log:
         notes = [*map_notes, *self.notes, *city.doubts.notes, *doubts.notes]
         if (apart_s := np.diff(self.times_s).max(initial=0.0)) > LONGEST_GAP_S:
             notes.append(f"Steps lie up to {apart_s:g} s apart; a drive looks between them.")
-        if bare := sum(not track.has_size for track in self.tracks):
+        if bare := sum(not _is_size(track.length_m, track.width_m) for track in self.tracks):
             of = f"{bare} of {len(self.tracks)}"
             notes.append(f"{of} objects got the usual size of their class.")
         if not _is_size(*self.ego_size_m):
@@ -367,7 +340,7 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
 
 def read_tracks(
     table: "pd.DataFrame", types: Mapping[str, AgentType], times_s: FloatArray, doubts: Doubts
-) -> dict[str, LoggedTrack]:
+) -> dict[str, Track]:
     """Return the tracks in a table with a row for each object and step.
 
     Args:
@@ -391,8 +364,8 @@ def read_tracks(
         every = np.full((len(times_s), 4), np.nan)
         every[seen] = own
         box = table.iloc[rows[0]]
-        tracks[str(name)] = LoggedTrack(
-            name=str(name),
+        tracks[str(name)] = Track(
+            agent_id=str(name),
             type=types[box["kind"]],
             length_m=float(box.get("length_m", 0.0)),
             width_m=float(box.get("width_m", 0.0)),
@@ -428,7 +401,7 @@ def _bound(log: Log) -> tuple[Log, Doubts]:
         return np.where(odd[:, None], np.nan, states)
 
     tracks = [replace(track, states=bound(track.states)) for track in log.tracks]
-    shared = len(tracks) - len({track.name for track in tracks})
+    shared = len(tracks) - len({track.agent_id for track in tracks})
     doubts.assume("Two objects have one id; both are taken", shared)
     return replace(log, ego=bound(log.ego), tracks=tracks), doubts
 
@@ -448,21 +421,20 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict
         near = np.flatnonzero(distances <= RADIUS_M)  # NaN is not near
         if len(near):
             away_m = round(float(distances[near[0]]), 3)
-            met.append((int(near[0]), away_m, track.name, track))
+            met.append((int(near[0]), away_m, track.agent_id, track))
     met.sort(key=lambda item: item[:3])
     tracks = []
     for number, (*_, track) in enumerate(met, start=2):
-        own = track.length_m, track.width_m
-        length_m, width_m = own if track.has_size else LENGTH_WIDTH_M[track.type]
-        tracks.append(
-            Track(
-                agent_id=f"Agent{number}",
-                type=track.type,
-                length_m=round(length_m, 3),
-                width_m=round(width_m, 3),
-                states=_local(track.states[frame:], origin),
-            )
+        own_m = track.length_m, track.width_m
+        length_m, width_m = own_m if _is_size(*own_m) else entities.LENGTH_WIDTH_M[track.type]
+        near_track = replace(
+            track,
+            agent_id=f"Agent{number}",
+            length_m=round(length_m, 3),
+            width_m=round(width_m, 3),
+            states=_local(track.states[frame:], origin),
         )
+        tracks.append(near_track)
     return tuple(tracks), {track.agent_id: ids[2] for track, ids in zip(tracks, met, strict=True)}
 
 
@@ -481,18 +453,10 @@ def _is_size(*sizes_m: float) -> bool:
 
 
 def _ego(log: Log, frame: int) -> TrafficAgent:
-    usual_m = EGO_LENGTH_M, EGO_WIDTH_M
-    length_m, width_m = log.ego_size_m if _is_size(*log.ego_size_m) else usual_m
-    return TrafficAgent(
-        id="Agent1",
-        type=AgentType.EGO_VEHICLE,
-        x_m=0.0,
-        y_m=0.0,
-        heading_rad=0.0,
-        width_m=round(width_m, 3),
-        length_m=round(length_m, 3),
-        speed_mps=round(float(log.ego[frame, 3]), 3),
-    )
+    length_m, width_m = log.ego_size_m
+    size_m = (round(length_m, 3), round(width_m, 3)) if _is_size(length_m, width_m) else None
+    speed_mps, origin = round(float(log.ego[frame, 3]), 3), Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+    return TrafficAgent.at(AgentType.EGO_VEHICLE, origin, size_m, id="Agent1", speed_mps=speed_mps)
 
 
 def _agent(track: Track) -> TrafficAgent:

@@ -260,11 +260,8 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     for first, second in tree.query([lines[name] for name in parting], predicate="crosses").T:
         first_name, other = parting[first], names[second]
         joined = forked[first_name] & forked[other] or merged[first_name] & merged[other]
-        if (
-            not joined
-            and first_name not in following[other]
-            and other not in following[first_name]
-        ):
+        follows = first_name in following[other] or other in following[first_name]
+        if not joined and not follows:
             inside.add(first_name)
     forks = {fork for name in inside for fork in forked[name]}
     merges = {merge for name in inside for merge in merged[name]}

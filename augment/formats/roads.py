@@ -136,6 +136,14 @@ def width_between(line: Polyline, left: Polyline, right: Polyline) -> float:
     return round(float(np.mean(widths)), 3)
 
 
+def is_far(points: FloatArray, reach_m: float) -> bool:
+    """Return whether the points' bounding box lies away from the origin; not for NaN."""
+    if len(points) == 0:
+        return True
+    gap = np.maximum(np.maximum(points.min(axis=0), -points.max(axis=0)), 0.0)
+    return bool(np.hypot(*gap) > reach_m)
+
+
 # Private
 
 
@@ -147,7 +155,7 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
     """
     lines = (segment.centerline, segment.left, segment.right)
     local = [None if line is None else _local(line, ego) for line in lines]
-    if all(points is None or _is_far(points, reach_m) for points in local):
+    if all(points is None or is_far(points, reach_m) for points in local):
         return None
     if any(points is not None and (np.abs(points) > LARGEST_M).any() for points in local):
         raise ValueError(f"reaches further than {LARGEST_M:g} m")
@@ -186,14 +194,6 @@ def _local(points: FloatArray, ego: Pose) -> FloatArray:
     return np.round(ego.to_local(np.where(np.abs(points) <= FURTHEST, points, np.nan)), 3)
 
 
-def _is_far(points: FloatArray, reach_m: float) -> bool:
-    """Return whether the points' bounding box lies away from the ego; not for NaN."""
-    if len(points) == 0:
-        return True
-    gap = np.maximum(np.maximum(points.min(axis=0), -points.max(axis=0)), 0.0)
-    return bool(np.hypot(*gap) > reach_m)
-
-
 def _areas(city: RoadMap, ego: Pose, reach_m: float) -> tuple[tuple[Area, ...], int]:
     """The areas within reach of the ego, the nearest first, and how many are not."""
     near, far = [], 0
@@ -201,7 +201,7 @@ def _areas(city: RoadMap, ego: Pose, reach_m: float) -> tuple[tuple[Area, ...], 
         with city.doubts.about("areas"), refuse_shape(f"{city.place}: {kind} {number}"):
             ring = _ring(points, ego)
             distance_m = reach_m + 1.0
-            if not _is_far(ring, reach_m):
+            if not is_far(ring, reach_m):
                 distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m
             if distance_m <= reach_m:
                 near.append((round(distance_m, 3), kind, ring.tolist()))

@@ -14,10 +14,8 @@ import numpy as np
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
-from augment.scene import entities
-from augment.scene.codec import scene_to_document
-from augment.scene.entities import LaneConnector, Scene
-from augment.scene.lane_graph import AnyLane
+from augment.scene import codec, entities
+from augment.scene.entities import AnyLane, LaneConnector, Scene
 from augment.scene.motion import Motion, MotionSource, Movement, find_motion
 from augment.scene.planned_motion import AtTime, PointPath
 from augment.scene.planned_mover import SETS_OUT_WITHIN_M
@@ -154,7 +152,7 @@ def check_finite(cell: Cell) -> None:
             step, is no finite number; or the ego is missing at a step.
     """
     try:
-        scene_to_document(cell.after)
+        codec.scene_to_document(cell.after)
     except (InvalidDocument, InvalidModification) as error:
         raise CannotExpress(str(error)) from error
     for movement in (cell.motion.ego, *cell.motion.others):
@@ -175,6 +173,7 @@ def write_each(
     for cell in cells:
         report = LossReport(cell)
         try:
+            check_finite(cell)
             files |= write_one(cell, report)
         except CannotExpress as reason:
             refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
@@ -254,11 +253,6 @@ def has_gaps(movement: Movement) -> bool:
     """Return whether an agent goes and comes back."""
     present = movement.is_present
     return bool((present[1:] & ~present[:-1]).sum() > (0 if present[0] else 1))
-
-
-def list_ways(scene: Scene) -> list[AnyLane]:
-    """Return lanes, then connectors."""
-    return [*scene.lanes, *scene.connectors]
 
 
 def way_edges(way: AnyLane) -> tuple[Polyline, Polyline]:

@@ -21,7 +21,7 @@ from augment.checks import Ground
 from augment.checks.wish import measure_wish
 from augment.checks.wish_patterns import match_nearest
 from augment.geometry.frames import difference
-from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.entities import UPRIGHT, AgentType, Modification, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.motion import HORIZON_S
 
@@ -340,8 +340,6 @@ def summarize_box(values_m: Sequence[float]) -> BoxSummary:
     )
 
 
-_UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})
-"""Drawn upright whatever their heading."""
 _ARROW_S = 1.0
 """A picture shows the motion of so much time as an arrow."""
 
@@ -402,7 +400,7 @@ def _find_shift(one: TrafficAgent, other: TrafficAgent) -> Shift | None:
     gaps_m = _list_arrow_gaps_m(one, other, ALIKE["seconds"])
     if gaps_m is None:
         return None
-    turned = replace(other, heading_rad=one.heading_rad) if one.type in _UPRIGHT else other
+    turned = replace(other, heading_rad=one.heading_rad) if one.type in UPRIGHT else other
     gaps_m += np.hypot(*(one.box.corners_m - turned.box.corners_m).T).tolist()
     turn_rad = difference(one.heading_rad, turned.heading_rad)
     return Shift(one=one, other=other, metres=max(gaps_m), degrees=abs(math.degrees(turn_rad)))
@@ -415,7 +413,7 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
         return False
     gaps_m.append(math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)))
     gaps_m += [abs(one.length_m - other.length_m), abs(one.width_m - other.width_m)]
-    turn_rad = 0.0 if one.type in _UPRIGHT else difference(one.heading_rad, other.heading_rad)
+    turn_rad = 0.0 if one.type in UPRIGHT else difference(one.heading_rad, other.heading_rad)
     return max(gaps_m) <= _SAME_M + 1e-9 and abs(turn_rad) <= _SAME_RAD + 1e-9
 
 

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Area, Lane, LaneConnector, Scene
-from augment.scene.lane_graph import AnyLane
 
 BoolArray = NDArray[np.bool_]
 
@@ -126,13 +125,12 @@ def find_extent(scene: Scene, radius_m: float) -> Extent:
 @lru_cache(maxsize=32)
 def find_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]:
     """From where to where each lane and connector is shown, by its id, in the scene's order."""
-    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     if math.isinf(radius_m):
-        return {lane.id: (0.0, lane.centerline.length_m) for lane in lanes}
+        return {lane.id: (0.0, lane.centerline.length_m) for lane in scene.ways}
     extent = find_extent(scene, radius_m)
     shown: dict[str, tuple[float, float]] = {}
     connectors: list[LaneConnector] = []
-    for lane in lanes:
+    for lane in scene.ways:
         span = extent.span(lane.centerline)
         if span is None:
             continue

@@ -30,7 +30,7 @@ from augment.prompts.extent import boundary_near, find_extent, find_spans
 from augment.scene import entities
 from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
 from augment.scene.codec import intent_to_parts
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import AtPlace, LanePath, PlannedMotion
 
 SPACING_M = 5.0
@@ -128,7 +128,7 @@ class LaneCurve:
 
     id: str
     lane: tuple[LanePiece, ...]
-    whole: AnyLane
+    whole: entities.AnyLane
     begins_m: float
     before: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
@@ -271,8 +271,7 @@ def scene_vectors(
     """
     names, spans = short_names(scene), find_spans(scene, radius_m)
     road: dict[str, dict[str, Vector]] = {"Lanes": {}, "Lane connectors": {}}
-    every: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    for lane in every:
+    for lane in scene.ways:
         if lane.id not in spans:
             continue
         line = lane.centerline.between(*spans[lane.id])
@@ -343,7 +342,7 @@ def _rename(value: Any, agents: Mapping[str, str], lanes: Mapping[str, str]) -> 
         return value
     changes = {}
     for part in fields(value):
-        value_before, is_lane = getattr(value, part.name), isinstance(value, AnyLane)
+        value_before, is_lane = getattr(value, part.name), isinstance(value, entities.AnyLane)
         if part.name in _OF_LANES or (part.name == "id" and is_lane):
             changes[part.name] = _lookup_name(value_before, lanes)
         elif part.name in _OF_AGENTS or part.name == "id":

@@ -18,18 +18,11 @@ from augment.render.camera import Camera, Inset
 from augment.render.canvas import Box, Canvas, stack_png
 from augment.render.labels import draw_badges, draw_ghosts, draw_labels, place_badges
 from augment.render.legend import draw_legend
-from augment.render.marks import draw_mark, draw_motion, draw_trails, draw_walks, is_small
+from augment.render.marks import SMALL, draw_mark, draw_motion, draw_trails, draw_walks
 from augment.render.palette import MarkStyle
 from augment.render.shapes import sides
-from augment.scene.entities import (
-    AgentType,
-    LaneConnector,
-    Modification,
-    Scene,
-    TrafficAgent,
-    apply,
-)
-from augment.scene.lane_graph import AnyLane
+from augment.scene import entities
+from augment.scene.entities import AnyLane, Modification, Scene, TrafficAgent
 from augment.scene.motion import find_trails
 from augment.scene.recording import Recording
 
@@ -94,7 +87,7 @@ def draw_for_review(scene: Scene, modification: Modification, camera: Camera) ->
         road.draw_scale(ground, road.scale_box(window, road.scale_corner(scene, window)))
         draw_labels(
             ground,
-            apply(scene, modification),
+            entities.apply(scene, modification),
             taken=taken,
             first=tuple(agent.id for agent in modification.changed),
             named=tuple(lane.id for lane in near),
@@ -106,15 +99,14 @@ def draw_for_review(scene: Scene, modification: Modification, camera: Camera) ->
 
 def lanes_near(scene: Scene, agents: tuple[TrafficAgent, ...]) -> list[AnyLane]:
     """Return the lanes and connectors near one of the agents, the nearest first."""
-    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     gaps_m = {
         lane.id: min(
             (lane.centerline.project(agent.x_m, agent.y_m).distance_m for agent in agents),
             default=np.inf,
         )
-        for lane in lanes
+        for lane in scene.ways
     }
-    near = [lane for lane in lanes if gaps_m[lane.id] <= NEAR_M]
+    near = [lane for lane in scene.ways if gaps_m[lane.id] <= NEAR_M]
     return sorted(near, key=lambda lane: (gaps_m[lane.id], lane.id))
 
 
@@ -130,7 +122,7 @@ def _paint_scene(
     ghosts: bool = True,
 ) -> tuple[Canvas, list[Box]]:
     """Draw all of a picture but its labels; return the boxes in pixels that text keeps free of."""
-    after = apply(scene, modification)
+    after = entities.apply(scene, modification)
     changed = {agent.id for agent in modification.changed}
     rest = replace(after, agents=tuple(agent for agent in after.agents if agent.id not in changed))
     # The scale keeps away from who was there before the change, the same for every contestant.
@@ -201,18 +193,18 @@ def _paint(ground: Canvas, styled: list[tuple[TrafficAgent, MarkStyle]]) -> None
 
     def order(entry: tuple[TrafficAgent, MarkStyle]) -> tuple[bool, float, str]:
         agent = entry[0]
-        is_ego = agent.type is AgentType.EGO_VEHICLE
+        is_ego = agent.type is entities.AgentType.EGO_VEHICLE
         return is_ego, -agent.length_m * agent.width_m, agent.id
 
     ordered = sorted(styled, key=order)
     for agent, style in ordered:
         draw_motion(ground, agent, style)
     for agent, style in ordered:
-        if not is_small(agent):
+        if agent.type not in SMALL:
             draw_mark(ground, agent, style)
     draw_walks(ground, ordered)
     for agent, style in ordered:
-        if is_small(agent):
+        if agent.type in SMALL:
             draw_mark(ground, agent, style)
 
 
@@ -222,7 +214,7 @@ def _paint(ground: Canvas, styled: list[tuple[TrafficAgent, MarkStyle]]) -> None
 def _draw_over_boxes(ground: Canvas, scene: Scene, lane: AnyLane) -> None:
     """Draw the dashed centre once more, above what stands on it, and a connector's edges."""
     colour = palette.OWN_LANE if lane.id == scene.ego.lane_id else palette.OTHER_LANE
-    if isinstance(lane, LaneConnector):
+    if isinstance(lane, entities.LaneConnector):
         colour = palette.CONNECTOR
         for side in sides(lane):
             ground.draw_dashes(ground.px(side), palette.INK, 1.2, 2.0, 4.0)

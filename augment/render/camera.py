@@ -21,8 +21,7 @@ from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
 from augment.render.shapes import lane_ring, sides
-from augment.scene.entities import Modification, Point, Scene, TrafficAgent
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import Modification, Point, Scene
 from augment.scene.motion import Expectation, ego_spots, find_trails
 
 WIDTH_PX = 1200
@@ -180,7 +179,8 @@ def changed_places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
     """Yield the points (N, 2) of each place that a change touches."""
     touched = {agent.id for agent in change.moved} | set(change.removed)
     for agent in (*(agent for agent in scene.agents if agent.id in touched), *change.changed):
-        yield _footprint(agent)
+        box = agent.box.corners_m
+        yield box if agent.walk_to_m is None else np.vstack([box, [agent.walk_to_m]])
 
 
 # Private
@@ -228,9 +228,8 @@ def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.n
     width, height = (int(side * _CELLS_PER_M) for side in size_m)
     raster = Image.new("L", (width, height))
     pen = ImageDraw.Draw(raster)
-    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for polygon in (
-        *(lane_ring(*sides(lane)) for lane in lanes),
+        *(lane_ring(*sides(lane)) for lane in scene.ways),
         *(np.array(area.boundary_m, dtype=np.float64) for area in scene.areas),
     ):
         cells = (polygon - origin_m) * _CELLS_PER_M
@@ -266,11 +265,6 @@ def _best(need: FloatArray, scene: Scene) -> Camera:
     row, column = divmod(int(order[0]), len(x_min))
     x_m, y_m = float(x_min[column]), float(y_min[row])
     return Camera.over((x_m, y_m), (x_m + width, y_m + height), WIDTH_PX / width)
-
-
-def _footprint(agent: TrafficAgent) -> FloatArray:
-    box = agent.box.corners_m
-    return box if agent.walk_to_m is None else np.vstack([box, [agent.walk_to_m]])
 
 
 def _distance_m(points_m: FloatArray) -> float:

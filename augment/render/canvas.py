@@ -189,10 +189,6 @@ class Canvas:
             write(finished)
         return finished._image
 
-    def _halve(self) -> Image.Image:
-        """One pixel for each four, blended, in full colour: for those who pay by the pixel."""
-        return self._finish_image().convert("RGB").reduce(DENSITY)
-
     def _smooth(self, at: Spot, text: str, size: int, anchor: str) -> None:
         """Write ink with soft edges: its steps towards paper are colours of the palette."""
         font = _font(size * DENSITY)
@@ -212,7 +208,10 @@ class Canvas:
 
 def stack_png(above: Canvas, below: Canvas) -> bytes:
     """Return two pictures of one width, one above the other, at half their density."""
-    first, second = above._halve(), below._halve()
+    # One pixel for each four, blended, in full colour: for those who pay by the pixel.
+    first, second = (
+        part._finish_image().convert("RGB").reduce(DENSITY) for part in (above, below)
+    )
     whole = Image.new("RGB", (first.width, first.height + second.height), palette.PAPER)
     whole.paste(first, (0, 0))
     whole.paste(second, (0, first.height))
@@ -248,16 +247,6 @@ def shrink_png(png: bytes, widest: int, box: Box | None = None) -> bytes:
         widest: In pixels, 1 or more; a picture that is no wider keeps its size.
         box: The part of it to take, in shares of its width and height; None for all.
     """
-    few = _smaller(png, widest, box).quantize(
-        _SMALL_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
-    )
-    return _pack(few, level=9)
-
-
-# Private
-
-
-def _smaller(png: bytes, widest: int, box: Box | None) -> Image.Image:
     with Image.open(io.BytesIO(png), formats=("PNG",)) as picture:
         if picture.width * picture.height > MOST_PIXELS:
             raise ValueError(f"a picture of {picture.width} x {picture.height} pixels")
@@ -266,8 +255,15 @@ def _smaller(png: bytes, widest: int, box: Box | None) -> Image.Image:
             width, height = picture.size
             left, upper, right, lower = box
             colours = colours.crop((left * width, upper * height, right * width, lower * height))
-        factor = -(-colours.width // widest)
-    return colours.reduce(factor) if factor > 1 else colours
+    factor = -(-colours.width // widest)
+    small = colours.reduce(factor) if factor > 1 else colours
+    few = small.quantize(
+        _SMALL_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
+    )
+    return _pack(few, level=9)
+
+
+# Private
 
 
 def _pack(image: Image.Image, level: int = _COMPRESS_LEVEL) -> bytes:

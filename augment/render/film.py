@@ -26,10 +26,9 @@ from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
 from augment.render.canvas import Canvas, Spot
-from augment.render.marks import draw_mark, is_small, is_upright
-from augment.render.palette import Colour, MarkStyle
+from augment.render.marks import SMALL, draw_mark
 from augment.render.shapes import runs
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.entities import UPRIGHT, AgentType, Modification, Scene, TrafficAgent, apply
 from augment.scene.motion import HORIZON_S, STEP_S, Movement, find_motion
 from augment.scene.recording import Recording
 
@@ -71,7 +70,10 @@ def make_film(
     movers: list[tuple[tuple[Any, ...], Entry]] = []
     for movement, style in styled:
         for first, last, values in _stretches(movement, camera):
-            mark = json.dumps(_shapes(movement.agent, style, camera.px_per_m))
+            sketch = _Sketch(camera.px_per_m)
+            upright = replace(movement.agent, x_m=0.0, y_m=0.0, heading_rad=0.0)
+            draw_mark(sketch, upright, style)
+            mark = json.dumps(sketch.shapes)
             movers.append((_order(movement.agent, style), [mark, first, last, values]))
     # By what they look like and where they are: their order tells nothing of their ids.
     movers.sort(key=lambda entry: (*entry[0], entry[1]))
@@ -152,29 +154,23 @@ class _Sketch(Canvas):
         self.camera = Camera.over((0.0, 0.0), (0.0, 0.0), px_per_m)
         self.shapes: list[dict[str, Any]] = []
 
-    def fill(self, points: FloatArray, colour: Colour) -> None:
+    def fill(self, points: FloatArray, colour: palette.Colour) -> None:
         self.shapes.append({"fill": _hex(colour), "points": _flat(points)})
 
-    def disc(self, centre: Spot, radius: float, colour: Colour) -> None:
+    def disc(self, centre: Spot, radius: float, colour: palette.Colour) -> None:
         self.shapes.append({"fill": _hex(colour), "disc": _flat([[*centre, radius]])})
 
     def stroke(
-        self, points: FloatArray, colour: Colour, width: float, *, closed: bool = False
+        self, points: FloatArray, colour: palette.Colour, width: float, *, closed: bool = False
     ) -> None:
         self.shapes.append({"stroke": _hex(colour), "points": _flat(points), "width": width})
-
-
-def _shapes(agent: TrafficAgent, style: MarkStyle, px_per_m: float) -> list[dict[str, Any]]:
-    sketch = _Sketch(px_per_m)
-    draw_mark(sketch, replace(agent, x_m=0.0, y_m=0.0, heading_rad=0.0), style)
-    return sketch.shapes
 
 
 def _flat(values: Any) -> list[int]:
     return [int(value) for value in np.round(np.asarray(values) * _FINE).ravel().tolist()]
 
 
-def _hex(colour: Colour) -> str:
+def _hex(colour: palette.Colour) -> str:
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
@@ -190,7 +186,9 @@ def _stretches(movement: Movement, camera: Camera) -> Iterator[tuple[int, int, l
         end = STEPS - 1 if last == len(states) - 1 else last
         pixels = camera.to_pixels(part[:, :2]) * _FINE
         # Clockwise in a picture whose y runs down; unwrapped, so that nobody spins round at pi.
-        turns = np.zeros(len(part)) if is_upright(agent) else -np.degrees(np.unwrap(part[:, 2]))
+        turns = (
+            np.zeros(len(part)) if agent.type in UPRIGHT else -np.degrees(np.unwrap(part[:, 2]))
+        )
         rows = np.round(np.column_stack([pixels, turns])).astype(int)
         # (T - 1, 3) differences of rounded rows: added up they give these again, without drift.
         steps = np.diff(rows, axis=0)
@@ -198,8 +196,8 @@ def _stretches(movement: Movement, camera: Camera) -> Iterator[tuple[int, int, l
         yield first, end, moves.ravel().tolist()
 
 
-def _order(agent: TrafficAgent, style: MarkStyle) -> tuple[Any, ...]:
+def _order(agent: TrafficAgent, style: palette.MarkStyle) -> tuple[Any, ...]:
     """As the still paints: what is changed above, people above vehicles, the small over large."""
     is_ego = agent.type is AgentType.EGO_VEHICLE
     is_changed = style is palette.CHANGED_MARK
-    return is_changed, is_small(agent), is_ego, -agent.length_m * agent.width_m
+    return is_changed, agent.type in SMALL, is_ego, -agent.length_m * agent.width_m

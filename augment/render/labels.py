@@ -11,8 +11,7 @@ from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, Spot, box_around, overlap, text_width_px
 from augment.render.road import raster
 from augment.render.shapes import spread
-from augment.scene.entities import Modification, Scene, TrafficAgent
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import AnyLane, Modification, Scene, TrafficAgent
 
 BADGE_TEXT_PX = 21
 _BADGE_PX, _ARROW_PX, _PADDING_PX = 34.0, 30.0, 11.0
@@ -122,8 +121,7 @@ def draw_labels(
     spots_of = {agent.id: ground.at(agent.x_m, agent.y_m) for agent in everyone}
     for name in (name for name in boxes if name in first and ground.shows(spots_of[name])):
         _label_at_a_line(ground, writer, name, boxes[name])
-    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    by_id = {lane.id: lane for lane in lanes}
+    by_id = {lane.id: lane for lane in scene.ways}
     centres = [_middle(box) for name, box in boxes.items() if name in first]
     for lane_id in named:
         spots = sorted(
@@ -141,7 +139,7 @@ def draw_labels(
         spots += [(right + aside, top - 12.0), (left - aside, bottom + 12.0), (x, top - 30.0)]
         if not writer.write(name, palette.INK, spots):
             writer.write(name, palette.INK, [*spots, (x, y)], over_marks=True)
-    for lane in lanes:
+    for lane in scene.ways:
         if lane.id not in named:
             writer.write(lane.id, palette.LANE_TEXT, _lane_spots(ground, lane, 40.0))
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from augment.geometry.frames import Pose
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
@@ -14,16 +15,8 @@ from augment.render.marks import draw_mark, draw_motion, draw_walks, is_walking,
 from augment.render.palette import Colour, MarkStyle
 from augment.render.road import own_lanes
 from augment.render.shapes import resample_line
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    AreaKind,
-    Modification,
-    Point,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-)
+from augment.scene import entities
+from augment.scene.entities import AgentType, AreaKind, Modification, Scene, TrafficAgent
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
@@ -56,7 +49,7 @@ _AGENT_KEYS = {
     AgentType.GENERIC_OBJECT: "object",
 }
 _AREA_KEYS = {AreaKind.CROSSWALK: "crosswalk", AreaKind.WALKWAY: "walkway"}
-_DARK = (TrafficLight.NONE, TrafficLight.UNKNOWN)
+_DARK = (entities.TrafficLight.NONE, entities.TrafficLight.UNKNOWN)
 
 _Sample = Callable[[Canvas, Spot], None]
 """Draws a sample about a point in pixels."""
@@ -167,27 +160,25 @@ def _map_entries(scene: Scene) -> Iterator[tuple[_Sample, str]]:
 
 
 def _agent(kind: AgentType, style: MarkStyle) -> _Sample:
-    return lambda canvas, at_m: draw_mark(canvas, _sample(kind, at_m), style)
+    def draw(canvas: Canvas, at_m: Spot) -> None:
+        pose = Pose(x_m=at_m[0], y_m=at_m[1], heading_rad=0.0)
+        draw_mark(canvas, TrafficAgent.at(kind, pose), style)
+
+    return draw
 
 
 def _walk(canvas: Canvas, at_m: Spot) -> None:
-    draw_walks(canvas, [(_mover(at_m, walk_to_m=(at_m[0] + 2.0, at_m[1])), palette.CHANGED_MARK)])
+    walker = replace(_make_mover(at_m), walk_to_m=(at_m[0] + 2.0, at_m[1]))
+    draw_walks(canvas, [(walker, palette.CHANGED_MARK)])
 
 
 def _motion(canvas: Canvas, at_m: Spot) -> None:
-    draw_motion(canvas, _mover(at_m), palette.OTHER_MARK)
+    draw_motion(canvas, _make_mover(at_m), palette.OTHER_MARK)
 
 
-def _mover(at_m: Spot, walk_to_m: Point | None = None) -> TrafficAgent:
-    person = _sample(AgentType.PEDESTRIAN, (at_m[0] - 2.5, at_m[1]))
-    return replace(person, speed_mps=4.0, walk_to_m=walk_to_m)
-
-
-def _sample(kind: AgentType, at_m: Spot) -> TrafficAgent:
-    (x_m, y_m), (length_m, width_m) = at_m, LENGTH_WIDTH_M[kind]
-    return TrafficAgent(
-        id="", type=kind, x_m=x_m, y_m=y_m, heading_rad=0.0, length_m=length_m, width_m=width_m
-    )
+def _make_mover(at_m: Spot) -> TrafficAgent:
+    pose = Pose(x_m=at_m[0] - 2.5, y_m=at_m[1], heading_rad=0.0)
+    return TrafficAgent.at(AgentType.PEDESTRIAN, pose, speed_mps=4.0)
 
 
 def _line_px(canvas: Canvas, at_m: Spot, half_px: float = 24.0) -> FloatArray:
@@ -230,7 +221,7 @@ def _agent_keys(agent: TrafficAgent) -> set[str]:
     return keys
 
 
-def _is_inside(points_m: FloatArray | Iterable[Point], view: Mapping[str, Any]) -> bool:
+def _is_inside(points_m: FloatArray | Iterable[entities.Point], view: Mapping[str, Any]) -> bool:
     """Return whether any point of a line lies in the picture."""
     points = np.asarray(points_m, dtype=np.float64)
     if len(points) > 1:

@@ -16,7 +16,7 @@ from augment.render import palette
 from augment.render.canvas import Canvas
 from augment.render.palette import Colour, MarkStyle
 from augment.render.shapes import stripes
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import UPRIGHT, AgentType, TrafficAgent
 from augment.scene.motion import Trail
 
 # The body of a person: on the smallest screen without scrolling, half as many.
@@ -32,6 +32,8 @@ _WALK_TURN_COS = 0.95
 # The tick at the nose of what moves is the way of this time.
 _TICK_S = 1.0
 
+SMALL = (AgentType.PEDESTRIAN, AgentType.BICYCLE, AgentType.BARRIER, *UPRIGHT)
+"""Their marks lie above walks and vehicles, which would hide them."""
 _Points = Sequence[tuple[float, float]]
 
 
@@ -104,16 +106,6 @@ def is_walking(agent: TrafficAgent) -> bool:
 def stands(agent: TrafficAgent) -> bool:
     """Return whether no arrow shows a motion."""
     return agent.walk_to_m is not None or abs(agent.speed_mps) < _STANDING_MPS
-
-
-def is_upright(agent: TrafficAgent) -> bool:
-    """Return whether the mark stands upright in the picture, whatever the heading."""
-    return agent.type in _UPRIGHT
-
-
-def is_small(agent: TrafficAgent) -> bool:
-    """Return whether the mark lies above walks and vehicles, which would hide it."""
-    return agent.type in _SMALL
 
 
 # Private
@@ -303,10 +295,3 @@ _PAINTERS: dict[AgentType, Callable[[Canvas, TrafficAgent, MarkStyle], None]] = 
     AgentType.CONSTRUCTION_SIGN: partial(_upright, shape=_DIAMOND, least_px=14.0),
     AgentType.GENERIC_OBJECT: _generic,
 }
-_SMALL = frozenset(
-    {
-        *(AgentType.PEDESTRIAN, AgentType.BICYCLE, AgentType.TRAFFIC_CONE),
-        *(AgentType.CONSTRUCTION_SIGN, AgentType.BARRIER),
-    }
-)
-_UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})

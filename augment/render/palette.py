@@ -83,21 +83,14 @@ def inks() -> dict[Colour, int]:
 
     The numbers go by the order of this file, so the same drawing gives the same bytes.
     """
-    counts: dict[Colour, int] = {}
+    colours: list[Colour] = []
     for value in globals().values():
         if isinstance(value, MarkStyle):
-            for colour in (value.fill, value.outline, value.detail, value.hatch):
-                if colour is not None:
-                    counts.setdefault(colour, len(counts))
-        elif _is_colour(value):
-            counts.setdefault(value, len(counts))
-    for step in (*TEXT_RAMP, *TRAIL):
-        counts.setdefault(step, len(counts))
-    return counts
-
-
-def _is_colour(value: object) -> bool:
-    return isinstance(value, tuple) and len(value) == 3 and all(type(v) is int for v in value)
+            colours += filter(None, (value.fill, value.outline, value.detail, value.hatch))
+        elif isinstance(value, tuple) and len(value) == 3 and all(type(v) is int for v in value):
+            colours.append(value)
+    every = dict.fromkeys([*colours, *TEXT_RAMP, *TRAIL])
+    return {colour: number for number, colour in enumerate(every)}
 
 
 TEXT_RAMP: tuple[Colour, ...] = tuple(

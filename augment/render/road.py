@@ -12,18 +12,10 @@ from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, overlap
 from augment.render.palette import Colour
 from augment.render.shapes import lane_ring, long_axis, offset, resample_line, runs, sides, stripes
+from augment.scene import entities
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import (
-    DRIVEN_ON,
-    AreaKind,
-    Lane,
-    LaneConnector,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-    TurnType,
-)
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.entities import AnyLane, AreaKind, Lane, LaneConnector, Scene, TrafficLight
+from augment.scene.lane_graph import LaneGraph
 
 GRID_M = 5.0
 Corner = tuple[bool, bool]
@@ -48,7 +40,12 @@ _LIGHTS = {
     TrafficLight.YELLOW: palette.LIGHT_YELLOW,
     TrafficLight.GREEN: palette.LIGHT_GREEN,
 }
-_LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
+_LEFT_TO_RIGHT = (
+    entities.TurnType.U_TURN,
+    entities.TurnType.LEFT,
+    entities.TurnType.STRAIGHT,
+    entities.TurnType.RIGHT,
+)
 _LAMP_PX = 5.5
 # Ahead of the ego's centre.
 _GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
@@ -61,9 +58,8 @@ _NEAR_PX = 50.0
 
 def draw_ground(ground: Canvas, scene: Scene) -> None:
     """Draw all that lies flat: areas first, then lines, centrelines with directions, the grid."""
-    every: list[AnyLane] = [*scene.lanes, *scene.connectors]
     shows = ground.camera.shows
-    lanes = [lane for lane in every if shows(lane.centerline.points_m, margin_m=lane.width_m)]
+    lanes = [lane for lane in scene.ways if shows(lane.centerline.points_m, margin_m=lane.width_m)]
     strips: list[Strip] = [(lane, *sides(lane)) for lane in lanes]
     areas = [(area.kind, np.array(area.boundary_m, dtype=np.float64)) for area in scene.areas]
     areas = [(kind, ring) for kind, ring in areas if shows(ring, margin_m=1.0)]
@@ -122,7 +118,9 @@ def draw_signals(ground: Canvas, scene: Scene) -> None:
             connectors, key=lambda connector: _LEFT_TO_RIGHT.index(connector.turn_type)
         )
         # The straightest way leaves its lane most squarely, so the bar is laid across that one.
-        first = min(ordered, key=lambda connector: connector.turn_type is not TurnType.STRAIGHT)
+        first = min(
+            ordered, key=lambda connector: connector.turn_type is not entities.TurnType.STRAIGHT
+        )
         start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
         states = list(dict.fromkeys(connector.traffic_light for connector in ordered))
         part_m = width_m / len(states)
@@ -227,7 +225,7 @@ def _surface(
         ground.stroke(polygon, palette.WALKWAY_EDGE, 1.5, closed=True)
     for polygon in walkways:
         ground.fill(polygon, palette.WALKWAY)
-    roads = [ground.px(ring) for kind, ring in areas if kind in DRIVEN_ON]
+    roads = [ground.px(ring) for kind, ring in areas if kind in entities.DRIVEN_ON]
     roads += [ground.px(lane_ring(left, right)) for _, left, right in strips]
     for polygon in roads:
         ground.stroke(polygon, palette.ROAD_EDGE, 4.0, closed=True)
@@ -337,7 +335,7 @@ def _centrelines(ground: Canvas, scene: Scene, lanes: list[AnyLane]) -> None:
                 shown.append(pose)
 
 
-def _is_on(lane: AnyLane, ego: TrafficAgent) -> bool:
+def _is_on(lane: AnyLane, ego: entities.TrafficAgent) -> bool:
     if lane.id == ego.lane_id:
         return True
     if not isinstance(lane, LaneConnector):

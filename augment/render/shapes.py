@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import FloatArray
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import AnyLane
 
 # Where a line turns sharply its offset is held back to this multiple of the distance.
 _MITER_LIMIT = 2.0

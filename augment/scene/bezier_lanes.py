@@ -109,10 +109,17 @@ def _usage(*pieces: LanePiece) -> float:
 def _cut(line: Polyline, span: _Span) -> list[LanePiece]:
     """The part of the line as the pieces that it takes to stay within what is allowed."""
     # A straight piece first: its two ends are the shortest that can be written.
-    straight = _straight_piece(line, span)
+    chord = straight_curve(*line.points_at(np.array(span)))
+    error = fit_error(chord, line, *span)
+    straight = LanePiece(
+        curve=chord, start_m=span[0], end_m=span[1], error=error, is_straight=True
+    )
     if _usage(straight) <= _STRAIGHT_SHARE:
         return [straight]
-    whole = _loose_piece(line, span)
+    whole = _piece(line, span)
+    if _usage(whole) > 1.0:
+        # Without the line's headings where it comes closer so.
+        whole = min([whole, *(_piece(line, span, ends) for ends in _FREE_ENDS)], key=_usage)
     if _usage(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
     halves = _best_halves(line, span)
@@ -143,21 +150,6 @@ def _best_halves(line: Polyline, span: _Span) -> tuple[LanePiece, LanePiece]:
         # The second row lies between the neighbours of the best cut.
         low_m, high_m = cuts_m[max(0, best - 1)], cuts_m[min(best + 1, _CUTS_TRIED - 1)]
     return halves[best]
-
-
-def _loose_piece(line: Polyline, span: _Span) -> LanePiece:
-    """One cubic with the line's headings, or without where it comes closer so."""
-    smooth = _piece(line, span)
-    if _usage(smooth) <= 1.0:
-        return smooth
-    return min([smooth, *(_piece(line, span, ends) for ends in _FREE_ENDS)], key=_usage)
-
-
-def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
-    """The chord of a part of the line."""
-    curve = straight_curve(*line.points_at(np.array(span)))
-    error = fit_error(curve, line, *span)
-    return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error, is_straight=True)
 
 
 def _piece(line: Polyline, span: _Span, fixed: tuple[bool, bool] = (True, True)) -> LanePiece:

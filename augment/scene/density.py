@@ -15,26 +15,20 @@ from itertools import chain, repeat
 
 from augment.geometry.frames import Pose, overlap
 from augment.geometry.polyline import Polyline
+from augment.scene import entities
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    Lane,
-    LaneConnector,
-    Modification,
-    Point,
-    Scene,
-    TrafficAgent,
-    TrafficDensity,
-    TrafficLight,
-)
+from augment.scene.entities import AgentType, LaneConnector, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 
 FIRST_ID = 101
 """Spawned agents are numbered from here, so that the ids of a change stay clear of them."""
 # Gaps are whole metres, as interPlan draws them.
 NARROWEST_M = 10
-WIDEST_M = {TrafficDensity.HIGH: 33, TrafficDensity.MEDIUM: 50, TrafficDensity.LOW: 100}
+WIDEST_M = {
+    entities.TrafficDensity.HIGH: 33,
+    entities.TrafficDensity.MEDIUM: 50,
+    entities.TrafficDensity.LOW: 100,
+}
 """No gap is as wide as this."""
 BEYOND_M = 50.0
 ACCEL_MPS2, DECEL_MPS2 = 1.0, 2.0
@@ -45,8 +39,8 @@ BUS_LENGTH_M = 7.0
 _FALLBACK_MPS = 10.0
 _ROLLS_MPS, _CREEPS_MPS = 1.0, 0.01
 """Traffic around a slower ego has its own speed but in interPlan, and who has none is parked."""
-_LIGHTS = (TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN)
-_USUAL_M = repeat(LENGTH_WIDTH_M[AgentType.VEHICLE])
+_LIGHTS = (entities.TrafficLight.RED, entities.TrafficLight.YELLOW, entities.TrafficLight.GREEN)
+_USUAL_M = repeat(entities.LENGTH_WIDTH_M[AgentType.VEHICLE])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,11 +53,11 @@ class SpawnedTraffic:
 
 def spawn_traffic(
     scene: Scene,
-    density: TrafficDensity,
+    density: entities.TrafficDensity,
     *,
     rng: random.Random,
     boxes_m: Iterator[tuple[float, float]] = _USUAL_M,
-    roadblocks_m: Sequence[Point] = (),
+    roadblocks_m: Sequence[entities.Point] = (),
     extras: Sequence[tuple[float, float, float]] = (),
 ) -> SpawnedTraffic:
     """Return the vehicles of that density; the same for the same random numbers.
@@ -77,7 +71,7 @@ def spawn_traffic(
         extras: Place and speed of vehicles that a scenario names one by one; each is put on the
             nearest lane.
     """
-    if density is TrafficDensity.NONE:
+    if density is entities.TrafficDensity.NONE:
         return SpawnedTraffic()
     graph = LaneGraph(scene)
     blocks = [find_ego_lane(scene, graph), *(graph.under(*place) for place in roadblocks_m)]
@@ -123,7 +117,7 @@ def is_bus(agent: TrafficAgent, scene: Scene) -> bool:
     return agent.length_m >= BUS_LENGTH_M
 
 
-def fit_boxes(scene: Scene, modification: Modification) -> Modification:
+def fit_boxes(scene: Scene, modification: entities.Modification) -> entities.Modification:
     """Return the change with the boxes that interPlan will use, where they are known."""
     rules, fitted = scene.options.interplan, []
     if rules is None or rules.boxes_m is None:
@@ -132,11 +126,11 @@ def fit_boxes(scene: Scene, modification: Modification) -> Modification:
     for agent in modification.added:
         size_m = agent.size_m
         if is_bus(agent, scene):
-            size_m = LENGTH_WIDTH_M[AgentType.BUS]
+            size_m = entities.LENGTH_WIDTH_M[AgentType.BUS]
         elif agent.type is AgentType.VEHICLE:
             size_m = next(left, scene.ego.size_m)
         elif agent.type in (AgentType.PEDESTRIAN, AgentType.TRAFFIC_CONE):
-            size_m = LENGTH_WIDTH_M[agent.type]
+            size_m = entities.LENGTH_WIDTH_M[agent.type]
         fitted.append(replace(agent, length_m=size_m[0], width_m=size_m[1]))
     return replace(modification, added=tuple(fitted))
 
@@ -145,7 +139,7 @@ def usual_size_m(scene: Scene, kind: AgentType) -> tuple[float, float]:
     """Return the length and width of what is added; a vehicle of interPlan's has its next box."""
     rules = scene.options.interplan
     if rules is None or rules.boxes_m is None or kind is not AgentType.VEHICLE:
-        return LENGTH_WIDTH_M[kind]
+        return entities.LENGTH_WIDTH_M[kind]
     return next(iter(rules.boxes_m), scene.ego.size_m)
 
 
@@ -174,7 +168,7 @@ def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
     Lanes from left to right, in which order nuPlan numbers them.
     """
     way = graph.lane(lane_id)
-    if isinstance(way, Lane):
+    if isinstance(way, entities.Lane):
         # The middle of the way, seen from a lane to its left, lies to the right.
         middle = way.centerline.position(way.centerline.length_m / 2.0)
         offsets = {
@@ -182,7 +176,9 @@ def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
         }
         return tuple(sorted(offsets, key=lambda name: offsets[name]))
     begins, ends = (
-        graph.abreast(name) if isinstance(graph.lanes.get(name or ""), Lane) and name else ()
+        graph.abreast(name)
+        if isinstance(graph.lanes.get(name or ""), entities.Lane) and name
+        else ()
         for name in (way.from_lane, way.to_lane)
     )
     return tuple(
@@ -197,7 +193,7 @@ def _extend(scene: Scene, graph: LaneGraph, lane_id: str) -> list[str]:
     """The lane with what leads to it and follows it, 50 m from the ego or to a traffic light."""
     # interPlan's map says which connectors have no light at all; another map may not know.
     is_told = scene.options.interplan is not None
-    lights = (*_LIGHTS, TrafficLight.UNKNOWN) if is_told else _LIGHTS
+    lights = (*_LIGHTS, entities.TrafficLight.UNKNOWN) if is_told else _LIGHTS
     names, line = [lane_id], graph.lane(lane_id).centerline
     ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
     for forwards, reach_m in ((False, ego_m), (True, line.length_m - ego_m)):
@@ -262,14 +258,9 @@ def _fill(
 def _vehicle(
     graph: LaneGraph, pose: Pose, speed_mps: float, size_m: tuple[float, float]
 ) -> TrafficAgent:
-    return TrafficAgent(
-        id="",
-        type=AgentType.VEHICLE,
-        x_m=round(pose.x_m, 3),
-        y_m=round(pose.y_m, 3),
-        heading_rad=round(pose.heading_rad, 5),
-        length_m=size_m[0],
-        width_m=size_m[1],
-        speed_mps=round(speed_mps, 2),
-        lane_id=graph.under(pose.x_m, pose.y_m, pose.heading_rad),
+    lane_id = graph.under(pose.x_m, pose.y_m, pose.heading_rad)
+    at = Pose(
+        x_m=round(pose.x_m, 3), y_m=round(pose.y_m, 3), heading_rad=round(pose.heading_rad, 5)
     )
+    speed_mps = round(speed_mps, 2)
+    return TrafficAgent.at(AgentType.VEHICLE, at, size_m, speed_mps=speed_mps, lane_id=lane_id)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -40,6 +40,8 @@ class AgentType(StrEnum):
 
 STEERED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 """Who drives or rides, the ego apart; all of them are longer than wide."""
+UPRIGHT = (AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN)
+"""What shows no front, whatever its heading."""
 
 
 class TrafficLight(StrEnum):
@@ -117,6 +119,29 @@ class TrafficAgent:
     walk_to_m: schema.PointPair | None = None
     motion: PlannedMotion | None = None
 
+    @classmethod
+    def at(
+        cls,
+        kind: AgentType,
+        pose: Pose,
+        size_m: tuple[float, float] | None = None,
+        *,
+        id: str = "",
+        **values: Any,
+    ) -> TrafficAgent:
+        """Return an agent at a pose, of its kind's usual size or of another length and width."""
+        length_m, width_m = size_m or LENGTH_WIDTH_M[kind]
+        return cls(
+            id=id,
+            type=kind,
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            heading_rad=pose.heading_rad,
+            length_m=length_m,
+            width_m=width_m,
+            **values,
+        )
+
     @property
     def pose(self) -> Pose:
         """Centre and heading."""
@@ -191,6 +216,10 @@ class LaneConnector:
     speed_limit_mps: schema.Limit | None = None
     left_boundary: _Left = None
     right_boundary: _Right = None
+
+
+AnyLane = Lane | LaneConnector
+"""Both are read by the verbs of `Polyline`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -282,6 +311,11 @@ class Scene:
     def everyone(self) -> tuple[TrafficAgent, ...]:
         """The ego first, then the others."""
         return (self.ego, *self.agents)
+
+    @property
+    def ways(self) -> tuple[AnyLane, ...]:
+        """Lanes, then connectors."""
+        return (*self.lanes, *self.connectors)
 
 
 EGO_LENGTH_M = 5.176
@@ -388,25 +422,14 @@ def without_traffic(scene: Scene) -> Scene:
     return replace(scene, agents=())
 
 
-class ScenarioType(StrEnum):
-    """A type by interPlan's own name (`type` of a special scenario)."""
+class ScenarioType(schema.LabelEnum):
+    """A type by interPlan's own name (`type` of a special scenario), with the paper's words."""
 
-    CONSTRUCTION_ZONE = "approaching_construction_zone"
-    ACCIDENT_SITE = "avoid_crashed_cars"
-    JAYWALKER = "jaywalking_pedestrian"
-    NUDGE = "nudge_around_parked_vehicle"
-    OVERTAKE = "overtake_parked_vehicle"
-
-    @property
-    def label(self) -> str:
-        """The words that the paper uses for it."""
-        return _LABELS.get(self) or self.name.replace("_", " ").capitalize()
-
-
-_LABELS = {
-    ScenarioType.NUDGE: "Nudge around parked vehicle",
-    ScenarioType.OVERTAKE: "Overtake parked vehicle",
-}
+    CONSTRUCTION_ZONE = "approaching_construction_zone", "Construction zone"
+    ACCIDENT_SITE = "avoid_crashed_cars", "Accident site"
+    JAYWALKER = "jaywalking_pedestrian", "Jaywalker"
+    NUDGE = "nudge_around_parked_vehicle", "Nudge around parked vehicle"
+    OVERTAKE = "overtake_parked_vehicle", "Overtake parked vehicle"
 
 
 def in_type_order(names: Iterable[str]) -> list[str]:

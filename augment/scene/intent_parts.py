@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.presets import preset_numbers
-from augment.scene.schema import Real, Yes
+from augment.scene.schema import LabelEnum, Real, Yes
 
 _Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
 _Value = Annotated[Real, Field(ge=0.0, le=100.0)]
@@ -39,24 +39,12 @@ class Side(StrEnum):
         return 1.0 if self is Side.LEFT else -1.0
 
 
-class Aim(StrEnum):
+class Aim(LabelEnum):
     """Type of an open wish, by its purpose."""
 
-    HIDE = "hide_pedestrian"
-    LEAVE_WAY = "leave_narrow_way"
-    FORCE_BRAKING = "force_braking"
-
-    @property
-    def label(self) -> str:
-        """What people read."""
-        return _AIMS[self]
-
-
-_AIMS = {
-    Aim.HIDE: "Hide a pedestrian until late",
-    Aim.LEAVE_WAY: "Leave one narrow way past",
-    Aim.FORCE_BRAKING: "Make the ego brake hard",
-}
+    HIDE = "hide_pedestrian", "Hide a pedestrian until late"
+    LEAVE_WAY = "leave_narrow_way", "Leave one narrow way past"
+    FORCE_BRAKING = "force_braking", "Make the ego brake hard"
 
 
 class MapPlace(StrEnum):

@@ -153,9 +153,5 @@ def _list_pose_facts(request: intents.Request | intents.Move) -> Iterator[str]:
 
 
 def _name_turn(turn_deg: float, *, is_signed: bool = True) -> str:
-    side = (
-        f"to the {intents.Side.LEFT if turn_deg > 0.0 else intents.Side.RIGHT}"
-        if is_signed
-        else "to a side"
-    )
-    return f"turned {abs(turn_deg):g} degrees {side}"
+    side = f"the {intents.Side.LEFT if turn_deg > 0.0 else intents.Side.RIGHT}"
+    return f"turned {abs(turn_deg):g} degrees to {side if is_signed else 'a side'}"

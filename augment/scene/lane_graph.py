@@ -1,6 +1,5 @@
 """Lanes and connectors as one graph: what lies beside a point, what comes next, what turns where.
 
-`AnyLane` is a lane or a lane connector; both are read by the verbs of `Polyline`.
 Frame: ego frame of the scene; any one frame for turns and sides.
 """
 
@@ -16,9 +15,7 @@ import shapely
 from augment.errors import UnknownName
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline, Projection
-from augment.scene.entities import Lane, LaneConnector, Scene, TrafficSide, TurnType
-
-AnyLane = Lane | LaneConnector
+from augment.scene.entities import AnyLane, Lane, LaneConnector, Scene, TrafficSide, TurnType
 
 STRAIGHT_BELOW_RAD = math.radians(30.0)
 U_TURN_ABOVE_RAD = math.radians(150.0)
@@ -93,8 +90,7 @@ class LaneGraph:
     """The lanes of one scene, by id, with their successors and predecessors, and by place."""
 
     def __init__(self, scene: Scene) -> None:
-        lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
-        self.lanes: dict[str, AnyLane] = {lane.id: lane for lane in lanes}
+        self.lanes: dict[str, AnyLane] = {lane.id: lane for lane in scene.ways}
         self._next: dict[str, list[str]] = {lane_id: [] for lane_id in self.lanes}
         self._previous: dict[str, list[str]] = {lane_id: [] for lane_id in self.lanes}
         self._ahead: dict[str, tuple[str, ...]] = {}

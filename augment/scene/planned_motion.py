@@ -4,13 +4,12 @@ Frame: the scene's. Distances between road users run straight from centre to cen
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
-from augment.scene.schema import CLOSED, Id, Metres, PointPair, Real, Speed, Yes
+from augment.scene.schema import CLOSED, Codec, Id, LabelEnum, Metres, PointPair, Real, Speed, Yes
 
 EGO_ID = "Agent1"
 """The ego's id in every scene."""
@@ -22,34 +21,18 @@ REACHED_M = 2.0
 """Somebody is at a place this near to it, where nobody says."""
 
 
-class MotionPreset(StrEnum):
+class MotionPreset(LabelEnum):
     """Critical motions by name; each is a type of the catalogue's moving set as well."""
 
-    CUT_IN = "cut_in"
-    HARD_BRAKING = "hard_braking"
-    LATE_PEDESTRIAN = "late_pedestrian"
-    DOOR_OPENING = "door_opening"
-    U_TURN = "u_turn"
-    RED_LIGHT = "red_light"
-    EMERGENCY_STOP = "emergency_stop"
-    PULL_OUT = "pull_out"
+    CUT_IN = "cut_in", "Cut-in"
+    HARD_BRAKING = "hard_braking", "Hard braking"
+    LATE_PEDESTRIAN = "late_pedestrian", "Pedestrian starts late"
+    DOOR_OPENING = "door_opening", "Door opens"
+    U_TURN = "u_turn", "U-turn"
+    RED_LIGHT = "red_light", "Red light is run"
+    EMERGENCY_STOP = "emergency_stop", "Emergency stop behind a bend"
+    PULL_OUT = "pull_out", "Parked car pulls out"
 
-    @property
-    def label(self) -> str:
-        """The words that people read for it."""
-        return _LABELS[self]
-
-
-_LABELS = {
-    MotionPreset.CUT_IN: "Cut-in",
-    MotionPreset.HARD_BRAKING: "Hard braking",
-    MotionPreset.LATE_PEDESTRIAN: "Pedestrian starts late",
-    MotionPreset.DOOR_OPENING: "Door opens",
-    MotionPreset.U_TURN: "U-turn",
-    MotionPreset.RED_LIGHT: "Red light is run",
-    MotionPreset.EMERGENCY_STOP: "Emergency stop behind a bend",
-    MotionPreset.PULL_OUT: "Parked car pulls out",
-}
 
 Seconds = Annotated[Real, Field(ge=0.0, le=60.0)]
 _Near = Annotated[Real, Field(gt=0.0, le=500.0)]
@@ -164,3 +147,6 @@ class PlannedMotion:
             speeds.append(f"and {len(self.speeds) - MOST_TOLD} more")
         parts = [f"sets out {self.start}", *([str(self.path)] if self.path else []), *speeds]
         return ", ".join(parts)
+
+
+MOTION = Codec("motion", TypeAdapter(PlannedMotion))

@@ -9,33 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from pydantic import TypeAdapter
 
 from augment.errors import CannotPlace, InvalidDocument
 from augment.geometry.frames import Pose, difference
 from augment.scene import entities, planned_mover
+from augment.scene import planned_motion as planned
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.lane_graph import ONCOMING_ABOVE_RAD
-from augment.scene.planned_motion import (
-    CHANGE_M,
-    AtPlace,
-    AtTime,
-    LanePath,
-    MotionPreset,
-    NearEgo,
-    Path,
-    PlannedMotion,
-    PointPath,
-    Trigger,
-)
-from augment.scene.schema import Codec
+from augment.scene.planned_motion import AtTime, LanePath, MotionPreset, NearEgo, PointPath
 
 DOOR_LENGTH_M, DOOR_WIDTH_M, DOOR_REACH_M = 1.1, 0.15, 0.9
 """A door as a slab beside its car, and how far out it slides."""
 TURN_RADIUS_M = 4.5
 """On which a car turns round; that of its centre."""
 
-_MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _NUMBERS = ("braking_mps2", "speed_mps", "duration_s")
 _SPEEDING_UP_MPS2 = 3.0
 _STARTS_WALKING_S = 0.5
@@ -66,7 +53,7 @@ class PresetNumbers:
         duration_s: How long a lane change takes, or the opening of a door.
     """
 
-    start: Trigger | None = None
+    start: planned.Trigger | None = None
     speed_mps: float | None = None
     braking_mps2: float | None = None
     duration_s: float | None = None
@@ -125,7 +112,7 @@ def with_preset(
     mover = _MAKERS[preset](_Case(preset, route, agent, lane_id, place, numbers))
     assert mover.motion is not None
     try:
-        _MOTION.from_parts(_MOTION.dump(mover.motion))
+        planned.MOTION.from_parts(planned.MOTION.dump(mover.motion))
     except InvalidDocument as fault:
         raise CannotPlace(f"{preset.label}: {fault}") from None
     return mover
@@ -193,11 +180,11 @@ class _Case:
 
     def moving(
         self,
-        path: Path | None,
+        path: planned.Path | None,
         speeds: tuple[tuple[float, float], ...],
-        start: Trigger | None = None,
+        start: planned.Trigger | None = None,
     ) -> entities.TrafficAgent:
-        motion = PlannedMotion(
+        motion = planned.PlannedMotion(
             path=path,
             speeds=speeds,
             start=start or self.numbers.start or USUAL[self.preset].start or AtTime(),
@@ -244,7 +231,7 @@ def _cut_in(case: _Case) -> entities.TrafficAgent:
     if case.is_in_ego_lane():
         raise case.refusal("it is in the ego's lane already.")
     mean_mps = (case.agent.speed_mps + case.reached_mps) / 2.0
-    least_m = CHANGE_M if case.numbers.duration_s is None else 1.0
+    least_m = planned.CHANGE_M if case.numbers.duration_s is None else 1.0
     change_m = round(min(max(least_m, mean_mps * case.number("duration_s")), 200.0), 1)
     if case.lane_id is None or not planned_mover.run_beside(case.route.graph, case.lane_id, own):
         raise case.refusal("it has to be in a lane beside the ego's, in the same direction.")
@@ -295,14 +282,10 @@ def _door_opening(case: _Case) -> entities.TrafficAgent:
     closed_m = car.width_m / 2.0 + DOOR_WIDTH_M / 2.0 + _DOOR_GAP_M
     local = [(_DOOR_AHEAD_M, side * across) for across in (closed_m, closed_m + DOOR_REACH_M)]
     closed, opened = map(_round, car.pose.to_parent(np.array(local)).tolist())
-    door = entities.TrafficAgent(
-        id="",
-        type=entities.AgentType.GENERIC_OBJECT,
-        x_m=closed[0],
-        y_m=closed[1],
-        heading_rad=car.heading_rad,
-        length_m=DOOR_LENGTH_M,
-        width_m=DOOR_WIDTH_M,
+    door = entities.TrafficAgent.at(
+        entities.AgentType.GENERIC_OBJECT,
+        Pose(x_m=closed[0], y_m=closed[1], heading_rad=car.heading_rad),
+        (DOOR_LENGTH_M, DOOR_WIDTH_M),
         lane_id=case.route.graph.under(*closed),
     )
     half_s = case.number("duration_s") / 2.0
@@ -392,7 +375,7 @@ def _red_light(case: _Case) -> entities.TrafficAgent:
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])
         # So far the ego is from the crossing when both have the same time to it.
         within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
-        meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
+        meets = planned.AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
         start = case.numbers.start or (meets if case.agent.is_stopped else AtTime())
         return case.moving(path, speeds, start)
     raise case.refusal("no way from its lane over a junction crosses the ego's.")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.schema import CLOSED, Id, Listed, Real, Size
 
@@ -111,13 +112,5 @@ def to_track(agent: TrafficAgent, states: NDArray[np.float64]) -> Track:
 def track_agent(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
     """Return the agent of a track as it is in one of its states (4,)."""
     x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
-    return TrafficAgent(
-        id=track.agent_id,
-        type=track.type,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        width_m=track.width_m,
-        length_m=track.length_m,
-        speed_mps=speed_mps,
-    )
+    pose, size_m = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad), (track.length_m, track.width_m)
+    return TrafficAgent.at(track.type, pose, size_m, id=track.agent_id, speed_mps=speed_mps)

@@ -9,8 +9,9 @@ import marshal
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import lru_cache
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -27,6 +28,19 @@ from augment.errors import InvalidDocument
 from augment.geometry.polyline import Polyline
 
 VERSION = 1
+
+
+class LabelEnum(StrEnum):
+    """Names as documents have them, each with the words that people read for it."""
+
+    _value_: str
+    label: str
+
+    def __new__(cls, value: str, label: str = "") -> Self:
+        name = str.__new__(cls, value)
+        name._value_, name.label = value, label
+        return name
+
 
 CLOSED = ConfigDict(extra="forbid", allow_inf_nan=False)
 """Of a whole document; the values in it go by the same."""

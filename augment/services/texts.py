@@ -7,10 +7,9 @@ from uuid import UUID
 
 from django.db.models import Manager
 from django.utils.text import slugify
-from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
-from augment.scene.planned_motion import PlannedMotion
+from augment.scene.planned_motion import MOTION
 
 
 def make_storable(text: str) -> str:
@@ -29,12 +28,9 @@ def make_document_storable(value: Any) -> Any:
     return value
 
 
-_MOTION = TypeAdapter(PlannedMotion)
-
-
 def motion_in_words(agent: dict[str, Any]) -> str:
     """Return the motion of a stored modification's agent in words; empty if it has none."""
-    return str(_MOTION.validate_python(agent["motion"])) if "motion" in agent else ""
+    return str(MOTION.shape.validate_python(agent["motion"])) if "motion" in agent else ""
 
 
 LONGEST_REASON = 2_000

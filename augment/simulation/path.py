@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from augment.geometry.polyline import Polyline
 from augment.simulation.states import BoolArray, FloatArray
 
 if TYPE_CHECKING:
@@ -96,14 +97,9 @@ class Path:
 
 def dense(points_m: FloatArray, spacing_m: float = SPACING_M) -> FloatArray:
     """Return a line (P, 2) cut into equal pieces of about the spacing; repeats are dropped."""
-    steps = np.hypot(*np.diff(points_m, axis=0).T)
-    points_m = points_m[np.concatenate([[True], steps > 1e-6])]
-    stations = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points_m, axis=0).T))])
-    count = max(1, round(float(stations[-1]) / spacing_m))
-    at = np.linspace(0.0, stations[-1], count + 1)
-    return np.stack(
-        [np.interp(at, stations, points_m[:, 0]), np.interp(at, stations, points_m[:, 1])], axis=1
-    )
+    line = Polyline(points_m)
+    count = max(1, round(line.length_m / spacing_m))
+    return line.points_at(np.linspace(0.0, line.length_m, count + 1))
 
 
 class Region:

@@ -11,14 +11,13 @@ from functools import cached_property
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import STRtree
 
 from augment.checks.ground import rings, strips
 from augment.errors import CannotDrive
 from augment.geometry.frames import difference
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import DRIVEN_ON, AreaKind, LaneConnector, Scene, TrafficLight
-from augment.scene.lane_graph import AnyLane, Beside, LaneGraph
+from augment.scene.entities import DRIVEN_ON, AnyLane, AreaKind, LaneConnector, Scene, TrafficLight
+from augment.scene.lane_graph import Beside, LaneGraph
 from augment.scene.recording import Recording
 from augment.simulation.path import SPACING_M, Path, Region, dense
 from augment.simulation.states import BoolArray, FloatArray, IntArray
@@ -237,7 +236,7 @@ class Road:
         return self._paths[number]
 
     @cached_property
-    def _tree(self) -> STRtree:
+    def _tree(self) -> shapely.STRtree:
         return shapely.STRtree(self.strips)
 
     @cached_property

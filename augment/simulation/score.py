@@ -104,7 +104,6 @@ class Score:
         expert: What progress was measured by.
     """
 
-    kind: ScoreKind
     value: float
     metrics: tuple[Metric, ...]
     collisions: tuple[Collision, ...]
@@ -149,7 +148,7 @@ def score_drive(
             passed = float(ratio >= _obstacles_end(drive.road, expert, places))
             metrics.append(Metric("ego_passed_obstacles", passed))
     parts = tuple(metrics)
-    return Score(kind=kind, value=combine(parts), metrics=parts, collisions=met, expert=expert)
+    return Score(value=combine(parts), metrics=parts, collisions=met, expert=expert)
 
 
 def combine(metrics: tuple[Metric, ...]) -> float:

@@ -13,8 +13,7 @@ from augment.formats.reading import Reading
 from augment.formats.writing import Cell
 from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import AnyLane, Area, Lane, LaneConnector, Scene, TrafficAgent
 from augment.scene.motion import Movement
 
 NEAR_M, NEAR_RAD, NEAR_MPS = 0.01, 0.001, 0.01

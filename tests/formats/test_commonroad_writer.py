@@ -74,7 +74,9 @@ def check_moving(told: dict[str, Any]) -> None:
 
 
 def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:
-    bare = cell(replace(crossing(), lanes=(), connectors=()), stem="bare", name="bare by rule")
+    ego = replace(crossing().ego, lane_id=None)
+    scene = replace(crossing(), ego=ego, lanes=(), connectors=())
+    bare = cell(scene, stem="bare", name="bare by rule", added=())
     made = write([bare, cell()])
     assert set(made.files) == {NAME}
     assert [str(one) for one in made.refused] == [

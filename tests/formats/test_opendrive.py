@@ -12,8 +12,7 @@ from augment.errors import InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.opendrive.reader import OpenDrive
 from augment.formats.reading import Reading
-from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import AnyLane, AreaKind, TrafficLight, TrafficSide
 from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand, lane_lines, make_map, write
 
 WITHIN_M = 0.01

@@ -11,8 +11,7 @@ import pytest
 from augment.formats.openscenario.writer import REAR_AXLE_SHARE, write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, Scene
-from augment.scene.lane_graph import AnyLane
+from augment.scene.entities import AnyLane, Lane, Scene
 from augment.scene.planned_motion import (
     AtPlace,
     AtTime,
@@ -149,8 +148,9 @@ def test_a_map_that_no_road_can_follow_is_refused() -> None:
     hairpin = Lane(
         id="Lane9", centerline=Polyline([(0.0, 0.0), (40.0, 0.0), (0.0, 0.5)]), width_m=3.5
     )
-    bent = cell(replace(crossing(), lanes=(hairpin,), connectors=()), added=(), name="bent")
-    bare = cell(replace(crossing(), lanes=(), connectors=()), added=(), name="bare")
+    off_lanes = replace(crossing(), ego=replace(crossing().ego, lane_id=None), connectors=())
+    bent = cell(replace(off_lanes, lanes=(hairpin,)), added=(), name="bent")
+    bare = cell(replace(off_lanes, lanes=()), added=(), name="bare")
     made = write([bent, bare])
     assert made.files == {}
     assert [str(one) for one in made.refused] == [

@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from augment.formats.reading import Log, LoggedTrack, speeds
+from augment.formats.reading import Log, speeds
 from augment.formats.road_map import RoadMap
 from augment.scene.entities import AgentType
+from augment.scene.recording import Track
 
 
 def test_no_speed_is_taken_over_a_gap() -> None:
@@ -21,8 +22,8 @@ def test_no_speed_is_taken_over_a_gap() -> None:
     ("kind", "speed_mps"), [(AgentType.TRAFFIC_CONE, 0.0), (AgentType.VEHICLE, 0.4)]
 )
 def test_cones_never_move_however_their_boxes_jitter(kind: AgentType, speed_mps: float) -> None:
-    jittering = LoggedTrack(
-        name="a", type=kind, length_m=0.4, width_m=0.4, states=np.array([[5.0, 0.0, 0.0, 0.4]])
+    jittering = Track(
+        agent_id="a", type=kind, length_m=0.4, width_m=0.4, states=np.array([[5.0, 0.0, 0.0, 0.4]])
     )
     rest: dict[str, Any] = {
         "world": "world", "title": "log", "licence": "none", "ego_size_m": (4.8, 2.0),

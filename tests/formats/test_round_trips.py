@@ -18,6 +18,7 @@ from augment.geometry.polyline import Polyline
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import (
     AgentType,
+    AnyLane,
     Lane,
     Modification,
     ScenarioType,
@@ -29,7 +30,6 @@ from augment.scene.entities import (
     TrafficSide,
     TurnType,
 )
-from augment.scene.lane_graph import AnyLane
 from augment.scene.planned_motion import PlannedMotion
 from tests.fixtures.shelf import entry, whole_scene
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street, ruled

@@ -18,9 +18,10 @@ from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.commonroad.network import read_network
 from augment.formats.commonroad.states import StateReader, read_box
 from augment.formats.documents import read_xml
-from augment.formats.reading import Log, LoggedTrack, LogReader
+from augment.formats.reading import Log, LogReader
 from augment.formats.road_map import note_left_out
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
+from augment.scene.recording import Track
 
 VERSIONS = ("2018b", "2020a", "2024")
 TYPE_OF = foreign.name_all(
@@ -76,14 +77,14 @@ class Obstacle:
         """Type of the agent."""
         return TYPE_OF.get(self.kind, AgentType.EGO_VEHICLE)
 
-    def track(self, steps: int) -> LoggedTrack:
+    def track(self, steps: int) -> Track:
         """Return its states at each step; what stands is there all the time."""
         states = np.full((steps, 4), np.nan)
         states[slice(None) if self.stands else self.steps] = self.states
         length_m, width_m = self.size_m
         name = f"{self.id:018d}"
-        return LoggedTrack(
-            name=name, type=self.type, length_m=length_m, width_m=width_m, states=states
+        return Track(
+            agent_id=name, type=self.type, length_m=length_m, width_m=width_m, states=states
         )
 
 

@@ -15,8 +15,9 @@ from augment.escaping import escape_controls
 from augment.formats import writing
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray
-from augment.scene.entities import AgentType, Lane, LaneConnector, Scene, TrafficLight, TurnType
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene import entities
+from augment.scene.entities import AgentType, AnyLane, Lane, LaneConnector, Scene, TrafficLight
+from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import STEP_S, MotionSource, Movement
 
 VERSION: Final = "2020a"
@@ -44,10 +45,10 @@ _BECOMES = {
     AgentType.GENERIC_OBJECT: "becomes an obstacle of unknown type",
 }
 _SIDE_OF = {
-    TurnType.RIGHT: "successorsRight",
-    TurnType.STRAIGHT: "successorsStraight",
-    TurnType.LEFT: "successorsLeft",
-    TurnType.U_TURN: "successorsLeft",
+    entities.TurnType.RIGHT: "successorsRight",
+    entities.TurnType.STRAIGHT: "successorsStraight",
+    entities.TurnType.LEFT: "successorsLeft",
+    entities.TurnType.U_TURN: "successorsLeft",
 }
 _COLOURS = {
     TrafficLight.GREEN: "green",
@@ -102,7 +103,7 @@ def _exact(name: str, value: float) -> ET.Element:
 
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     scene = cell.after
-    if not writing.list_ways(scene):
+    if not scene.ways:
         raise writing.CannotExpress("CommonRoad needs at least one lane, and this scene has none")
     ids: Ids = defaultdict(count(1).__next__)
     # A map's name in a benchmark id has letters and digits alone.
@@ -141,7 +142,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
 
 def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
     scene = cell.after
-    graph, ways = LaneGraph(scene), writing.list_ways(scene)
+    graph, ways = LaneGraph(scene), scene.ways
     for way in ways:
         ids[way.id]  # lanelets have the first numbers
     for way in ways:
@@ -250,13 +251,9 @@ def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]
         agent, states = movement.agent, movement.states
         is_static = _is_static(movement)
         sizes = _tag("length", float(agent.length_m)), _tag("width", float(agent.width_m))
+        kinds, usual = (_STATIC, "parkedVehicle") if is_static else (_DYNAMIC, "unknown")
         parts = [
-            _tag(
-                "type",
-                _STATIC.get(agent.type, "parkedVehicle")
-                if is_static
-                else _DYNAMIC.get(agent.type, "unknown"),
-            ),
+            _tag("type", kinds.get(agent.type, usual)),
             _tag("shape", _tag("rectangle", *sizes)),
             _state("initialState", states[0], 0, has_speed=not is_static),
         ]
@@ -310,7 +307,9 @@ def _report(cell: Cell, report: LossReport) -> None:
     names = [other.agent.id for other in moving if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
     ways, unknown = scene.connectors, TrafficLight.UNKNOWN
-    turned = [connector.id for connector in ways if connector.turn_type is TurnType.U_TURN]
+    turned = [
+        connector.id for connector in ways if connector.turn_type is entities.TurnType.U_TURN
+    ]
     report.lose_of(turned, "a U-turn becomes a turn to the left")
     entered = [connector.id for connector in ways if connector.from_lane is None]
     report.lose_of(entered, "its turn type is not said: no lane leads into it")

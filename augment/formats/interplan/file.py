@@ -21,21 +21,10 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
-from augment.geometry.frames import wrap
+from augment.geometry.frames import Pose, wrap
+from augment.scene import entities
 from augment.scene.density import SpawnedTraffic, fit_boxes, spawn_traffic
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    InterplanRules,
-    Modification,
-    Point,
-    ScenarioType,
-    Scene,
-    SceneOptions,
-    TrafficAgent,
-    TrafficDensity,
-    TurnType,
-)
+from augment.scene.entities import AgentType, Scene, TrafficAgent, TrafficDensity, TurnType
 from augment.scene.planned_mover import WALK_S
 from augment.scene.schema import Size, Speed, list_problems, path
 
@@ -74,7 +63,7 @@ class _Part(BaseModel):
 class SpecialScenario(_Part):
     """One special scenario."""
 
-    type: Annotated[ScenarioType, Strict(False)]
+    type: Annotated[entities.ScenarioType, Strict(False)]
     config: _Config | None = None
     stopped_vehicle: _Objects[_Standing] = []
     stopped_bus: _Objects[_Standing] = []
@@ -165,10 +154,8 @@ def parse_file(document: object) -> tuple[File, list[tuple[str, str]]]:
             file = File.model_validate(_leave_out(document, fault))
         except ValidationError:
             raise InvalidDocument(WHAT, problems) from None
-    if not any(
-        modification.special_scenario
-        for modification in file.modification_details_dictionary.values()
-    ):
+    every = file.modification_details_dictionary.values()
+    if not any(details.special_scenario for details in every):
         raise InvalidDocument(WHAT, problems or [("", "holds no special scenario")])
     return file, problems
 
@@ -194,7 +181,7 @@ def entry_place(token: str, index: str | int, *steps: str | int) -> str:
 
 def read_entry(
     token: str, index: str | int, entry: SpecialScenario, scene: Scene
-) -> tuple[Modification, list[str]]:
+) -> tuple[entities.Modification, list[str]]:
     """Return a special scenario as a change: vehicles, buses, cones, pedestrians.
 
     Boxes are interPlan's if known, else our usual ones; cones get the direction of the ego's way.
@@ -214,7 +201,7 @@ def read_entry(
     ground, left_out = Ground.of(scene), list[str]()
     added: list[TrafficAgent] = []
 
-    def place(x_m: float, y_m: float, key: str, number: int) -> Point:
+    def place(x_m: float, y_m: float, key: str, number: int) -> entities.Point:
         x_m, y_m = _to_local(scene, x_m, y_m)
         away_m = math.hypot(x_m, y_m)
         if away_m > FURTHEST_FROM_EGO_M:
@@ -225,10 +212,11 @@ def read_entry(
             raise InvalidDocument(WHAT, [(entry_place(token, index, key, number), problem)])
         return x_m, y_m
 
-    def add(kind: AgentType, point: Point, heading_rad: float, **more: Any) -> None:
+    def add(kind: AgentType, point: entities.Point, heading_rad: float, **more: Any) -> None:
+        pose = Pose(x_m=point[0], y_m=point[1], heading_rad=heading_rad)
+        values = more | {"lane_id": ground.graph.under(*point, heading_rad)}
         number = len(scene.everyone) + 1 + len(added)
-        lane_id = ground.graph.under(*point, heading_rad)
-        added.append(_agent(number, kind, (*point, heading_rad), lane_id, **more))
+        added.append(TrafficAgent.at(kind, pose, id=f"Agent{number}", **values))
 
     for kind, key in ((AgentType.VEHICLE, "stopped_vehicle"), (AgentType.BUS, "stopped_bus")):
         for number, (x_m, y_m, yaw_rad) in enumerate(getattr(entry, key)):
@@ -251,28 +239,7 @@ def read_entry(
         if iteration is not None:
             left_out.append(f"pedestrian {number} starts at iteration {iteration}")
     left_out += [f"key {key}" for key in entry.model_extra or {}]
-    return fit_boxes(scene, Modification(added=tuple(added))), left_out
-
-
-def _agent(
-    number: int,
-    kind: AgentType,
-    pose: tuple[float, float, float],
-    lane_id: str | None,
-    **more: Any,
-) -> TrafficAgent:
-    length_m, width_m = LENGTH_WIDTH_M[kind]
-    return TrafficAgent(
-        id=f"Agent{number}",
-        type=kind,
-        x_m=pose[0],
-        y_m=pose[1],
-        heading_rad=pose[2],
-        width_m=width_m,
-        length_m=length_m,
-        lane_id=lane_id,
-        **({"speed_mps": 0.0} | more),
-    )
+    return fit_boxes(scene, entities.Modification(added=tuple(added))), left_out
 
 
 def surround(
@@ -335,11 +302,11 @@ def follow_rules(scene: Scene, source: Mapping[str, Any] | None) -> Scene:
         return scene
     built = Built.model_validate(source["built"], strict=False)
     speed_mps = scene.ego.speed_mps if built.ego_mps is None else built.ego_mps
-    options = replace(scene.options, interplan=InterplanRules(boxes_m=built.boxes_m))
+    options = replace(scene.options, interplan=entities.InterplanRules(boxes_m=built.boxes_m))
     return replace(scene, ego=replace(scene.ego, speed_mps=speed_mps), options=options)
 
 
-def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Point | None:
+def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> entities.Point | None:
     """Return where a goal of interPlan's file lies in the ego frame, None where it has no place.
 
     Args:
@@ -354,7 +321,7 @@ def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Poi
     return _to_local(scene, x_m, y_m)
 
 
-def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
+def _to_local(scene: Scene, x_m: float, y_m: float) -> entities.Point:
     x_m, y_m = scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0].tolist()
     return x_m, y_m
 
@@ -374,7 +341,7 @@ def parse_suffix(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
     return _DENSITIES[parts.get("d")], _TURNS[parts.get("g")]
 
 
-def format_suffix(options: SceneOptions, suffix: str = "") -> str:
+def format_suffix(options: entities.SceneOptions, suffix: str = "") -> str:
     """Return the suffix of a scenario's options; as given where that says the same already."""
     if parse_suffix(suffix) == (options.density, options.goal):
         return suffix

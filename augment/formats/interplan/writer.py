@@ -15,19 +15,11 @@ from augment.errors import Conflict
 from augment.formats.interplan import file as interplan
 from augment.formats.interplan.file import InterplanSource
 from augment.formats.interplan.runs import MODIFICATIONS, NuplanScenario, run_files
-from augment.formats.writing import Cell, Loss, LossReport, Output
+from augment.formats.writing import CannotExpress, Cell, Loss, LossReport, Output, check_finite
 from augment.geometry.frames import difference, wrap
+from augment.scene import entities
 from augment.scene.density import is_bus
-from augment.scene.entities import (
-    AgentType,
-    Modification,
-    Point,
-    ScenarioType,
-    Scene,
-    TrafficAgent,
-    TrafficDensity,
-    without_traffic,
-)
+from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent
 
 WORKER_STEP_M = 1.0
 USUAL_WALK_M = 12.0
@@ -56,7 +48,13 @@ def write(cells: Sequence[Cell]) -> Output:
     """
     entries: list[_Entry] = []
     losses: list[Loss] = []
+    refused: list[Loss] = []
     for cell in cells:
+        try:
+            check_finite(cell)
+        except CannotExpress as reason:
+            refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
+            continue
         if cell.type is None:
             text = "interPlan has five types of scenarios, and this one is of another: left out"
             losses.append(Loss(cell=cell.name, text=text, changes_scene=True))
@@ -84,7 +82,8 @@ def write(cells: Sequence[Cell]) -> Output:
     }
     file = next((source.file for source in sources.values() if source.file), None)
     text = interplan.yaml_text(documents, comments, file)
-    return Output(files={MODIFICATIONS: text.encode()} | run_files(runs), losses=tuple(losses))
+    files = {MODIFICATIONS: text.encode()} | run_files(runs)
+    return Output(files=files, losses=tuple(losses), refused=tuple(refused))
 
 
 def _list_numbers(entries: Sequence["_Entry"]) -> list[str]:
@@ -117,7 +116,7 @@ def _list_numbers(entries: Sequence["_Entry"]) -> list[str]:
 class _Entry:
     """One special scenario while it is written."""
 
-    def __init__(self, cell: Cell, kind: ScenarioType) -> None:
+    def __init__(self, cell: Cell, kind: entities.ScenarioType) -> None:
         self.cell, self.kind = cell, kind
         self.source = cell.source or InterplanSource(token=interplan.scene_token(cell.scene.name))
         self.token = self.source.token
@@ -131,7 +130,7 @@ class _Entry:
         return self._read(self.source.entry) == self.cell.modification
 
     def _read(self, entry: Mapping[str, Any]) -> Modification:
-        scene = without_traffic(self.cell.scene)
+        scene = entities.without_traffic(self.cell.scene)
         special = interplan.SpecialScenario.model_validate(entry)
         return interplan.read_entry(self.token, self.source.index or "0", special, scene)[0]
 
@@ -146,7 +145,7 @@ class _Entry:
         change, by_key = self.cell.modification, defaultdict[str, list[TrafficAgent]](list)
         for agent in change.added:
             by_key[_find_key(agent, self.cell.scene)].append(agent)
-        if self.cell.scene.options.density is not TrafficDensity.NONE:
+        if self.cell.scene.options.density is not entities.TrafficDensity.NONE:
             self._lose(f"traffic that would meet a vehicle of this change is left out{_OUTCOME}")
         if self.cell.keeps_traffic:
             # Also with interPlan's "a1": without density traffic it deletes all vehicles twice.
@@ -204,7 +203,9 @@ class _Entry:
         start = agent.x_m, agent.y_m
         if agent.walk_to_m is not None and math.dist(start, agent.walk_to_m) >= _NO_WALK_M:
             return agent.walk_to_m
-        stands = agent.walk_to_m is not None or self.kind is ScenarioType.CONSTRUCTION_ZONE
+        stands = (
+            agent.walk_to_m is not None or self.kind is entities.ScenarioType.CONSTRUCTION_ZONE
+        )
         length_m = WORKER_STEP_M if stands else USUAL_WALK_M
         return (
             agent.x_m + length_m * math.cos(agent.heading_rad),
@@ -233,12 +234,9 @@ def _changes(agent: TrafficAgent, counterpart: TrafficAgent) -> Iterator[tuple[s
     """Yield the values that come back changed, and whether they change the scene."""
     if agent.type is not counterpart.type:
         yield f"is {agent.length_m:g} m long and becomes a {counterpart.type}", True
-    sizes = (agent.length_m, agent.width_m), (counterpart.length_m, counterpart.width_m)
+    resized_m = np.abs(np.subtract(agent.size_m, counterpart.size_m)).max()
     box = f"has a box of {agent.length_m:g} x {agent.width_m:g} m"
-    if (
-        counterpart.type is not AgentType.VEHICLE
-        and np.abs(np.subtract(*sizes)).max() > _SAME_SIZE_M
-    ):
+    if counterpart.type is not AgentType.VEHICLE and resized_m > _SAME_SIZE_M:
         yield f"{box}, which becomes {counterpart.length_m:g} x {counterpart.width_m:g} m", False
     turned_deg = math.degrees(abs(difference(agent.heading_rad, counterpart.heading_rad)))
     if turned_deg > _SAME_WAY_DEG:

@@ -17,7 +17,6 @@ import numpy as np
 import shapely
 
 from augment import foreign
-from augment.foreign import FloatArray
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.opendrive.network import CONTACTS, END, START, MapRoad, RoadNetwork, Section
 from augment.formats.road_map import RoadMap, Segment
@@ -43,7 +42,7 @@ LaneKey = tuple[str, int, int]
 """Road, number of its section, id of the lane."""
 Joint = tuple[tuple[LaneKey, str], tuple[LaneKey, str]]
 """Two lanes, each with its end."""
-Areas = list[tuple[AreaKind, FloatArray]]
+Areas = list[tuple[AreaKind, foreign.FloatArray]]
 
 
 def map_around(
@@ -162,13 +161,10 @@ def _lay_section(
     return areas
 
 
-def _thin(points: FloatArray) -> FloatArray:
+def _thin(points: foreign.FloatArray) -> foreign.FloatArray:
     """Return the points (P, 2) that a line needs."""
-    return np.asarray(
-        shapely.get_coordinates(
-            shapely.LineString(points).simplify(_THIN_M, preserve_topology=False)
-        )
-    )
+    line = shapely.LineString(points).simplify(_THIN_M, preserve_topology=False)
+    return np.asarray(shapely.get_coordinates(line))
 
 
 def _read_areas(road: MapRoad, element: Element) -> Areas:
@@ -276,7 +272,10 @@ def _find_lights(
     lanes_of = defaultdict[str, list[LaneKey]](list)
     for key in segments:
         lanes_of[key[0]].append(key)
-    for road, element in _signals(roads):
+    placed = [(road, e) for road in roads for e in road.element.findall("signals/*")]
+    for road, element in placed:
+        if element.tag not in ("signal", "signalReference"):
+            continue
         name = element.get("id", "")
         if name not in network.lights:
             is_signal = element.tag == "signal"
@@ -298,10 +297,3 @@ def _find_lights(
             governing |= dict.fromkeys(governed, name)
             network.doubts.assume("A light governs no way through a junction", not governed)
     return governing
-
-
-def _signals(roads: Sequence[MapRoad]) -> Iterator[tuple[MapRoad, Element]]:
-    for road in roads:
-        for element in road.element.findall("signals/*"):
-            if element.tag in ("signal", "signalReference"):
-                yield road, element

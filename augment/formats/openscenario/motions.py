@@ -14,7 +14,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import shapely
-from pydantic import TypeAdapter
 
 from augment import foreign
 from augment.errors import InvalidDocument, InvalidModification
@@ -28,23 +27,14 @@ from augment.formats.openscenario.sources import Entity
 from augment.formats.openscenario.trajectories import trace
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
+from augment.scene import planned_motion as planned
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import find_motion
-from augment.scene.planned_motion import (
-    AtPlace,
-    AtTime,
-    LanePath,
-    Path,
-    PlannedMotion,
-    PointPath,
-    Trigger,
-)
+from augment.scene.planned_motion import AtTime, LanePath, PlannedMotion, PointPath
 from augment.scene.planned_mover import HeldCourse, lane_line, way_and_speed
 from augment.scene.recording import Recording
-from augment.scene.schema import Codec
 
-_MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _MOST_SPEEDS, _MOST_POINTS, _MOST_LANES = 50, 200, 20
 _BESIDE_ROUTE_M = 15.0
 """Lanes of a route end no further from its roads' middles."""
@@ -103,10 +93,16 @@ class Stage:
         needed, name = dict[str, TrafficAgent](), agent.id
         while name in by_id and name not in needed:
             needed[name], motion = by_id[name], by_id[name].motion
-            name = motion.start.agent_id if motion and isinstance(motion.start, AtPlace) else ""
+            name = (
+                motion.start.agent_id
+                if motion and isinstance(motion.start, planned.AtPlace)
+                else ""
+            )
         self._expect(replace(self.scene, agents=tuple(needed.values())))
 
-    def find_start(self, event: StoryEvent, name: str, doubts: Doubts) -> tuple[Trigger, int]:
+    def find_start(
+        self, event: StoryEvent, name: str, doubts: Doubts
+    ) -> tuple[planned.Trigger, int]:
         """Return how an event begins, and the step; an ego that stands may have to set off."""
         self._set_off(self.scene.ego.speed_mps)  # it may have for another alone
         with suppress(InvalidDocument):
@@ -205,8 +201,8 @@ class _Draft:
 
     def __init__(self, stage: Stage, name: str, agent: TrafficAgent, doubts: Doubts) -> None:
         self._stage, self._name, self._agent, self._doubts = stage, name, agent, doubts
-        self.start: Trigger | None = None
-        self.path: Path | None = None
+        self.start: planned.Trigger | None = None
+        self.path: planned.Path | None = None
         self.speeds: list[tuple[float, float]] = []
         self._line: Polyline | None = None
         self._step = 0
@@ -217,7 +213,7 @@ class _Draft:
             return self._agent
         motion = PlannedMotion(path=self.path, speeds=tuple(self.speeds), start=self.start)
         # What breaks a bound of motions is left out.
-        bounded = doubts.read("motions", _MOTION.from_parts, _MOTION.dump(motion))
+        bounded = doubts.read("motions", planned.MOTION.from_parts, planned.MOTION.dump(motion))
         return replace(self._agent, motion=bounded)
 
     def add(self, event: StoryEvent) -> None:
@@ -243,7 +239,7 @@ class _Draft:
     def _begin(self, event: StoryEvent) -> float:
         """Set the start by the first event, and return how long after it an event begins."""
         expected, doubts = self._stage.expected, self._doubts
-        start: Trigger
+        start: planned.Trigger
         if (wait := event.waits_for) is not None:
             done = expected.find_done(wait, event.place)
             delay_s = foreign.read_number(

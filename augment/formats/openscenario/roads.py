@@ -15,8 +15,8 @@ import numpy as np
 from augment.formats import writing
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
-from augment.scene.entities import LaneConnector, Scene, TrafficLight, TrafficSide
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.entities import AnyLane, LaneConnector, Scene, TrafficLight, TrafficSide
+from augment.scene.lane_graph import LaneGraph
 
 NARROWEST_M: Final = 0.1
 _SHARPEST: Final = 0.3
@@ -38,9 +38,9 @@ def write_map(cell: Cell, report: LossReport) -> bytes:
     from scenariogeneration import xodr
 
     scene = cell.after
-    if not writing.list_ways(scene):
+    if not scene.ways:
         raise writing.CannotExpress("OpenDRIVE needs at least one road, and there is no lane")
-    roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.list_ways(scene), start=1)}
+    roads = {way.id: _Road.of(way, n) for n, way in enumerate(scene.ways, start=1)}
     connecting = [connector for connector in scene.connectors if _is_connecting(connector, roads)]
     groups = dict(enumerate(writing.group_connectors(connecting), start=_FIRST_JUNCTION))
     links = _Links(roads)
@@ -263,7 +263,7 @@ def _text(root: ET.Element, cell: Cell) -> bytes:
     """The file; its header has no time of day, but extent and origin."""
     header = root.find("header")
     assert header is not None
-    points = np.vstack([way.centerline.points_m for way in writing.list_ways(cell.after)])
+    points = np.vstack([way.centerline.points_m for way in cell.after.ways])
     pose = cell.after.origin.pose
     header.set("date", f"{cell.made_on.isoformat()}T00:00:00")
     extent = (*points.max(axis=0), *points.min(axis=0))

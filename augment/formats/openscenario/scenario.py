@@ -30,10 +30,11 @@ from augment.formats.openscenario.motions import Stage, read_motion, read_speed_
 from augment.formats.openscenario.positions import PositionReader
 from augment.formats.openscenario.sources import EGO_NAMES, ScenarioSource, is_catalog
 from augment.formats.openscenario.trajectories import trace
-from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
+from augment.formats.reading import Log, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 from augment.scene.motion import STEP_S, read_at
+from augment.scene.recording import Track
 
 _LIGHT_ACTION = "TrafficSignalStateAction"
 LONGEST_S = 60.0
@@ -318,9 +319,9 @@ class _Scenario:
             states[0] = [*self._middles[name], self._mps.get(name) or 0.0]
         return states
 
-    def _track(self, name: str, states: FloatArray) -> LoggedTrack:
+    def _track(self, name: str, states: FloatArray) -> Track:
         kind, (length_m, width_m) = self._entities[name].type, self._entities[name].size_m
-        return LoggedTrack(name=name, type=kind, length_m=length_m, width_m=width_m, states=states)
+        return Track(agent_id=name, type=kind, length_m=length_m, width_m=width_m, states=states)
 
 
 def _is_step(action: Element) -> bool:

@@ -20,7 +20,6 @@ import numpy as np
 from augment.formats import writing
 from augment.formats.openscenario.roads import write_map
 from augment.formats.openscenario.trajectories import place_beside
-from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import STEP_S, FloatArray, MotionSource, Movement, find_motion
@@ -49,7 +48,7 @@ _MARGIN_M = 1e-4
 _USUAL_HEIGHT_M, _MASS_KG, _FASTEST_MPS = 1.8, 1000.0, 70.0
 
 
-def write(cells: Sequence[Cell]) -> writing.Output:
+def write(cells: Sequence[writing.Cell]) -> writing.Output:
     """For each cell a scenario and its map; a map that no road can follow is refused."""
     return writing.write_each(cells, _write_one)
 
@@ -57,7 +56,7 @@ def write(cells: Sequence[Cell]) -> writing.Output:
 # Private
 
 
-def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
+def _write_one(cell: writing.Cell, report: writing.LossReport) -> dict[str, bytes]:
     from scenariogeneration import xosc
 
     road_file, motion = f"{cell.stem}.xodr", cell.motion
@@ -140,7 +139,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
     return init
 
 
-def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
+def _events(xosc: Any, cell: writing.Cell, movement: Movement) -> Iterator[Any]:
     """Yield an agent's events: come, follow a trajectory, go. Nothing if it stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
     if (mover := _with_motion(movement)) is not None:
@@ -161,7 +160,9 @@ def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
         yield _event(xosc, f"{agent.id} is gone", action, float(times_s[last + 1]))
 
 
-def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) -> Iterator[Any]:
+def _own_events(
+    xosc: Any, cell: writing.Cell, movement: Movement, agent: TrafficAgent
+) -> Iterator[Any]:
     """Yield the events before and after its motion starts; past the map it is gone."""
     started_s, times_s = movement.started_s, cell.motion.times_s
     if agent.speed_mps > 0.0 and started_s != 0.0:
@@ -173,10 +174,12 @@ def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) 
     by_clock = isinstance(_motion_in(agent).start, AtTime)
     if started_s is None and (by_clock or agent.speed_mps > 0.0):
         return  # after the end; or where its path begins would depend on the ego
-    states = _states_since_start(cell, agent, started_s or 0.0)
+    start_s = started_s or 0.0
+    setting_out = replace(agent, motion=replace(_motion_in(agent), start=AtTime(after_s=start_s)))
+    states = carry_out(setting_out, LaneGraph(cell.after), (start_s + times_s).tolist())
     if np.isnan(states).all():
         return  # it has left the map by then
-    since_s = times_s + (started_s or 0.0) if by_clock else times_s
+    since_s = times_s + start_s if by_clock else times_s
     follow = _follow(xosc, agent, since_s, states, is_relative=not by_clock)
     begins = _trigger(xosc, cell, agent, started_s)
     event = _event(xosc, f"{agent.id} sets out", follow, begins, xosc.Priority.override)
@@ -195,7 +198,7 @@ def _until_gone(xosc: Any, agent: TrafficAgent, states: FloatArray, event: Any) 
         yield _event(xosc, name, xosc.DeleteEntityAction(agent.id), trigger)
 
 
-def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None) -> Any:
+def _trigger(xosc: Any, cell: writing.Cell, agent: TrafficAgent, started_s: float | None) -> Any:
     """The moment at which a motion starts."""
     start, name = _motion_in(agent).start, f"{agent.id} sets out"
     if isinstance(start, AtTime):
@@ -242,7 +245,9 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
     )
 
 
-def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: TrafficAgent) -> None:
+def _report_start(
+    cell: writing.Cell, report: writing.LossReport, movement: Movement, agent: TrafficAgent
+) -> None:
     """Say what of a motion's start holds with our ego alone."""
     start, started_s = _motion_in(agent).start, movement.started_s
     if agent.type in _THINGS:
@@ -262,7 +267,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
         report.lose(f"{agent.id}: sets out from where it is with our ego; with others it jumps")
 
 
-def _report(cell: Cell, report: LossReport) -> None:
+def _report(cell: writing.Cell, report: writing.LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
     for participant in cell.motion.others:
         if (agent := _with_motion(participant)) is not None:
@@ -311,22 +316,15 @@ def _motion_in(agent: TrafficAgent) -> PlannedMotion:
     return agent.motion
 
 
-def _list_unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
+def _list_unstarted_states(cell: writing.Cell, agent: TrafficAgent) -> FloatArray:
     """Return states (T, 4) of an agent whose motion never starts; NaN past the map."""
     alone = replace(cell.after, agents=(replace(agent, motion=None),))
     recording = cell.recording and cell.recording.without({agent.id})
     return find_motion(alone, recording=recording).others[0].states
 
 
-def _states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> FloatArray:
-    """Return states (T, 4) from the start of its motion on; NaN past the map."""
-    motion = replace(_motion_in(agent), start=AtTime(after_s=started_s))
-    times_s = (started_s + cell.motion.times_s).tolist()
-    return carry_out(replace(agent, motion=motion), LaneGraph(cell.after), times_s)
-
-
 def _measure_distance(
-    cell: Cell, agent: TrafficAgent, start: NearEgo | AtPlace, started_s: float | None
+    cell: writing.Cell, agent: TrafficAgent, start: NearEgo | AtPlace, started_s: float | None
 ) -> _WrittenDistance:
     """Return the distance by which a motion starts, which in the cell it does then or never."""
     moves = {move.agent.id: move for move in (cell.motion.ego, *cell.motion.others)}

@@ -16,10 +16,11 @@ import shapely
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
+from augment.formats.reading import Log, LogReader, read_each
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, note_left_out
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
+from augment.scene.recording import Track
 
 _SCENARIOS = "sd_*.pkl"
 TYPE_OF = {
@@ -103,7 +104,7 @@ def _log(path: Path, item: str | None) -> Log:
         doubts.assume("Steps without times are taken as 0.1 s apart")
         times = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
     times_s = foreign.read_times(times, "metadata.ts")
-    tracks, left_out = dict[str, LoggedTrack](), Counter[str]()
+    tracks, left_out = dict[str, Track](), Counter[str]()
     for key, track in description["tracks"].items():
         with doubts.about("objects"):
             track = foreign.read_as(track, dict, f"tracks.{key}")
@@ -116,7 +117,7 @@ def _log(path: Path, item: str | None) -> Log:
     if ego_id in map(str, description["tracks"].keys() - tracks.keys()):
         raise fault_at("metadata.sdc_id", " ".join([f"{ego_id} is no ego.", *doubts.notes]))
     ego = foreign.look_up(tracks, ego_id, "metadata.sdc_id")
-    del tracks[ego.name]
+    del tracks[ego.agent_id]
     if ego.width_m > ego.length_m:
         doubts.assume("The ego's length and width were swapped and put right")
     current = metadata.get("current_time_index")
@@ -147,7 +148,7 @@ def _log(path: Path, item: str | None) -> Log:
     )
 
 
-def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
+def _track(key: str, track: Any, steps: int, doubts: Doubts) -> Track:
     place = f"tracks.{key[:40]}"
     kind = foreign.look_up(TYPE_OF, track.get("type"), f"{place}.type")
     state = foreign.read_as(track.get("state"), dict, f"{place}.state")
@@ -170,8 +171,8 @@ def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
             column = _column(state.get(name, [0.0] * steps), steps, f"{place}.{name}", 1)[:, 0]
             values = column[seen & ~odd & np.isfinite(column) & (column > 0.0)]
             sizes_m[number] = float(np.median(values)) if len(values) else 0.0
-    return LoggedTrack(
-        name=key,
+    return Track(
+        agent_id=key,
         type=AgentType.BUS if finest.startswith(BUS) else kind,
         length_m=sizes_m[0],
         width_m=sizes_m[1],
@@ -278,12 +279,9 @@ def _segment(
 
 def _limit(value: object, place: str, unit_mps: float) -> float | None:
     """A limit in m/s; 0 stands for none."""
-    is_text = isinstance(value, str)
-    return (
-        foreign.read_speed(value, place, unit_mps)
-        if is_text or foreign.read_number(value, place)
-        else None
-    )
+    if not isinstance(value, str) and foreign.read_number(value, place) == 0.0:
+        return None
+    return foreign.read_speed(value, place, unit_mps)
 
 
 def _name(value: object, place: str) -> str:

@@ -67,20 +67,6 @@ class _Array:
         return self
 
 
-def _build_scalar(kind: Any, block: Any) -> Any:
-    return _Array().fill(block, kind, (), "C").value.item()
-
-
-def _build_from_buffer(block: Any, kind: Any, shape: Any, order: Any) -> _Array:
-    """Build the array of newer protocols."""
-    return _Array().fill(block, kind, shape, order if order == "F" else "C")
-
-
-def _build_dictionary(*_: Any) -> dict[Any, Any]:
-    """Build a dictionary with a default, which is dropped."""
-    return {}
-
-
 def _enum_number(value: Any) -> Any:
     """Return the number of an enumeration's member, which stands for it."""
     if not isinstance(value, int):
@@ -98,8 +84,8 @@ def _encode(text: str, coding: str = "latin1") -> bytes:
 _ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
     "numpy.ndarray": None,
     "numpy.dtype": _Kind,
-    "collections.defaultdict": _build_dictionary,
-    "collections.OrderedDict": _build_dictionary,
+    "collections.defaultdict": lambda *_: {},  # its default is dropped
+    "collections.OrderedDict": lambda *_: {},
     "builtins.int": None,
     "builtins.set": set,
     "__builtin__.int": None,
@@ -111,8 +97,12 @@ _ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
         for kind in ("AgentType", "RoadLineType", "RoadEdgeType")
     },
     "numpy.core.multiarray._reconstruct": _Array,
-    "numpy.core.multiarray.scalar": _build_scalar,
-    "numpy.core.numeric._frombuffer": _build_from_buffer,
+    "numpy.core.multiarray.scalar": lambda kind, block: (
+        _Array().fill(block, kind, (), "C").value.item()
+    ),
+    "numpy.core.numeric._frombuffer": lambda block, kind, shape, order: _Array().fill(
+        block, kind, shape, order if order == "F" else "C"
+    ),
 }
 """Version 2 of numpy calls its `core` `_core`."""
 

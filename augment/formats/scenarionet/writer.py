@@ -15,15 +15,8 @@ import shapely
 
 from augment.formats import writing
 from augment.formats.writing import Cell, LossReport
-from augment.scene.entities import (
-    AgentType,
-    AreaKind,
-    Lane,
-    LaneConnector,
-    Scene,
-    TrafficLight,
-    TrafficSide,
-)
+from augment.scene import entities
+from augment.scene.entities import AgentType, AreaKind, Lane, LaneConnector, Scene, TrafficLight
 from augment.scene.lane_graph import LaneGraph, classify_turn
 from augment.scene.motion import Movement
 
@@ -135,9 +128,9 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
     dark = [way.id for way in connectors if way.traffic_light is TrafficLight.NONE]
     report.lose_of(dark, "that it has no light is not said")
-    if any(way.left_boundary or way.right_boundary for way in writing.list_ways(scene)):
+    if any(way.left_boundary or way.right_boundary for way in scene.ways):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
-    if scene.traffic_side is TrafficSide.LEFT:
+    if scene.traffic_side is entities.TrafficSide.LEFT:
         report.lose("that people drive on the left stands in the metadata, where few stacks look")
     report.lose("heights are not known; those usual for the types are written")
     report.lose("the origin in the source's own frame is not written; the ego's place at t0 is 0")
@@ -182,7 +175,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
     features: dict[str, dict[str, Any]] = {}
-    for way in writing.list_ways(scene):
+    for way in scene.ways:
         points_m, (left, right) = way.centerline.points_m, writing.way_edges(way)
         beside = (way.left_neighbor, way.right_neighbor) if isinstance(way, Lane) else (None, None)
         features[way.id] = {
@@ -209,9 +202,7 @@ def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
 
 def _road_edges(scene: Scene) -> Iterator[np.ndarray]:
     """The edges of lanes (P, 2) where no other lane or connector lies beside or across them."""
-    sides = [
-        [edge.points_m for edge in writing.way_edges(way)] for way in writing.list_ways(scene)
-    ]
+    sides = [[edge.points_m for edge in writing.way_edges(way)] for way in scene.ways]
     outlines = [shapely.Polygon(np.vstack([left, right[::-1]])) for left, right in sides]
     covers = shapely.buffer(shapely.make_valid(outlines), _BESIDE_M)
     tree = shapely.STRtree(covers)

@@ -22,16 +22,10 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
-from augment.formats.road_map import (
-    WIDEST_M,
-    RoadMap,
-    Segment,
-    edge_distances,
-    mean_width,
-    note_left_out,
-)
+from augment.formats import road_map
+from augment.formats.reading import Log, LogReader, read_each
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
+from augment.scene.recording import Track
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 EXAMPLES = (
@@ -82,7 +76,7 @@ def _log(file: str, number: int, payload: bytes) -> Log:
     with doubts.about("fields of messages"):
         _check_fields(scenario)
     times_s = foreign.read_times(scenario.timestamps_seconds, "timestamps_seconds")
-    tracks = dict[int, LoggedTrack]()
+    tracks = dict[int, Track]()
     for index, track in enumerate(scenario.tracks):
         with doubts.about("objects"):
             tracks[index] = _track(index, track, len(times_s), doubts)
@@ -111,7 +105,7 @@ def _log(file: str, number: int, payload: bytes) -> Log:
         licence=LICENCE,
         item=str(number),
         frame=doubts.read("current times", foreign.read_whole, *current) or 0,
-        notes=[*note_left_out("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
+        notes=[*road_map.note_left_out("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
     )
 
 
@@ -184,7 +178,7 @@ def _check_fields(message: Any) -> None:
                 _check_fields(part)
 
 
-def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
+def _track(index: int, track: Any, steps: int, doubts: Doubts) -> Track:
     """The track; boxes change a little from step to step, the usual one is taken."""
     place = f"tracks[{index}]"
     kind = foreign.look_up(TYPE_OF, track.object_type, f"{place}.object_type")
@@ -200,15 +194,19 @@ def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     seen = valid & ~odd
     states[~seen] = np.nan
     sizes_m = np.median(columns[seen, 5:], axis=0).tolist() if seen.any() else (0.0, 0.0)
-    return LoggedTrack(
-        name=f"{track.id:012d}", type=kind, length_m=sizes_m[0], width_m=sizes_m[1], states=states
+    return Track(
+        agent_id=f"{track.id:012d}",
+        type=kind,
+        length_m=sizes_m[0],
+        width_m=sizes_m[1],
+        states=states,
     )
 
 
 # The map
 
 
-def read_city(scenario: Any, frame: int) -> RoadMap:
+def read_city(scenario: Any, frame: int) -> road_map.RoadMap:
     """Return the map with the lights of one step."""
     lanes, edges, areas = list[tuple[int, Any]](), dict[int, FloatArray](), []
     left_out, doubts = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}, Doubts()
@@ -238,7 +236,7 @@ def read_city(scenario: Any, frame: int) -> RoadMap:
     doubts.assume("A traffic light governs no lane that is there", idle)
     segments = doubts.index_last("lanes", lanes).items()
     rows = ((*lane, edges, lights, controlled, doubts) for lane in segments)
-    return RoadMap(
+    return road_map.RoadMap(
         place="map_features",
         segments=tuple(doubts.read_all("lanes", _segment, rows)),
         areas=tuple(areas),
@@ -261,7 +259,7 @@ def _segment(
     lights: Mapping[int, TrafficLight | None],
     controlled: set[int],
     doubts: Doubts,
-) -> Segment:
+) -> road_map.Segment:
     place = f"map_features.{key}"
     line = _points(lane.polyline, place)
     foreign.look_up(LANE_TYPES, lane.type, f"{place}.type")
@@ -274,20 +272,20 @@ def _segment(
         return start, end, edge
 
     left, right = (
-        edge_distances(
+        road_map.edge_distances(
             line, doubts.read_all("edges of lanes", read_edge, ((part,) for part in boundaries))
         )
         for boundaries in (lane.left_boundaries, lane.right_boundaries)
     )
     is_whole = _is_whole_edge(line, left) and _is_whole_edge(line, right)
     limit = lane.speed_limit_mph or None  # 0 stands for none
-    return Segment(
+    return road_map.Segment(
         name=key,
         crosses=lane.interpolating or key in controlled,
         centerline=line,
         left=left if is_whole else None,
         right=right if is_whole else None,
-        width_m=mean_width(line, left, right),
+        width_m=road_map.mean_width(line, left, right),
         successors=tuple(lane.exit_lanes),
         predecessors=tuple(lane.entry_lanes),
         left_neighbors=tuple(neighbor.feature_id for neighbor in lane.left_neighbors),
@@ -301,5 +299,5 @@ def _is_whole_edge(line: FloatArray, edge: FloatArray) -> bool:
     """Return whether an edge is known all along, has a length and is nowhere another lane's."""
     if len(edge) < 2 or not np.isfinite(edge).all():
         return False
-    is_near = np.hypot(*(edge - line).T).max() <= WIDEST_M
+    is_near = np.hypot(*(edge - line).T).max() <= road_map.WIDEST_M
     return bool(is_near and np.hypot(*np.diff(edge, axis=0).T).sum() > 0.5)

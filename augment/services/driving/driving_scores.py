@@ -193,7 +193,8 @@ def _scores(
         contestant = 0 if row.augmentation is None else row.augmentation.contestant_id
         cells[row.subject, contestant].append(row)
     elsewhere = list(results.select_related("augmentation__contestant", "augmentation__scenario"))
-    types = [*(row.scenario.type for row in rows), *map(_scenario_type, elsewhere)]
+    types = [row.scenario.type for row in rows]
+    types += [row.augmentation.scenario.type for row in elsewhere]
     kinds = in_type_order([*ScenarioType, *types])
     lines = [_line(cell, before, score, kinds) for cell in cells.values()]
     failures = Counter(row.reason for row in rows if row.state == State.FAILED)
@@ -244,7 +245,7 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
     for (_, _, planner), cell in sorted(cells.items()):
         contestant = cell[0].augmentation.contestant
         done = [row for row in cell if row.score is not None]
-        scored = [(_scenario_type(row), row.score) for row in cell if row.score is not None]
+        scored = [(row.augmentation.scenario.type, row.score or 0.0) for row in done]
         yield DrivingLine(
             subject=Subject.AUGMENTATION,
             name=f"{contestant.name}, driven in nuPlan by {planner}",
@@ -260,10 +261,6 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
             braked=None,
             driven_by=planner,
         )
-
-
-def _scenario_type(row: NuplanResult) -> str:
-    return row.augmentation.scenario.type
 
 
 def _document(row: Simulation) -> dict[str, Any]:

@@ -61,7 +61,13 @@ def import_results(*, tokens: Path, folders: Sequence[Path]) -> ImportedResults:
             imported.append((row, drive))
     with transaction.atomic():
         for row, drive in imported:
-            _keep(row, drive)
+            rules = ScoreKind.INTERPLAN if drive.is_interplan else ScoreKind.NUPLAN
+            NuplanResult.objects.update_or_create(
+                augmentation=row,
+                planner=drive.planner,
+                rules=rules.value,
+                defaults={"score": drive.score, "reason": drive.reason, "parts": drive.parts},
+            )
         for pk, number in sorted(Counter(row.job_id for row, _ in imported).items()):
             job = GenerationJob.objects.get(pk=pk)
             log_change(job, "import nuPlan results", None, after={"results": number})
@@ -85,13 +91,3 @@ def _find_code(text: str) -> UUID | None:
         return UUID(text)
     except ValueError:
         return None
-
-
-def _keep(row: Augmentation, drive: NuplanDrive) -> None:
-    rules = ScoreKind.INTERPLAN if drive.is_interplan else ScoreKind.NUPLAN
-    NuplanResult.objects.update_or_create(
-        augmentation=row,
-        planner=drive.planner,
-        rules=rules.value,
-        defaults={"score": drive.score, "reason": drive.reason, "parts": drive.parts},
-    )

@@ -9,14 +9,7 @@ from string import ascii_lowercase as LETTERS
 from django.db.models import Q
 
 from augment.errors import Conflict, UnknownName
-from augment.metrics.paired import (
-    ClusteredMean,
-    PlannerDifference,
-    Scores,
-    compare_planners,
-    estimate_score,
-    find_sets,
-)
+from augment.metrics import paired
 from augment.models import Contestant, GenerationJob, Simulation
 from augment.services.driving.driving_scores import drives_of_job, options_driven
 from augment.services.driving.simulations import SCORES, Options
@@ -37,7 +30,7 @@ class PlannerLine:
     name: str
     contestant: Contestant | None
     planner: str
-    estimate: ClusteredMean
+    estimate: paired.ClusteredMean
     against: str = ""
     sets: str = ""
     p_holm: float | None = None
@@ -110,7 +103,7 @@ def compare_job(
             drives[key] = (row.scenario.base_scene_id, float(getattr(row, SCORES[score])))
     order = [Subject.UNMODIFIED, Subject.REFERENCE, Subject.AUGMENTATION]
     placed = sorted(cells, key=lambda cell: (order.index(cell[0]), str(who[cell[1]]), cell[1]))
-    compared = compare_planners([cells[cell] for cell in placed])
+    compared = paired.compare_planners([cells[cell] for cell in placed])
     return PlannerTable(
         title=job.name,
         score=score,
@@ -126,15 +119,15 @@ def compare_job(
 def _lines(
     subject: Subject,
     contestant: Contestant | None,
-    scores: Mapping[str, Scores],
-    differences: Sequence[PlannerDifference],
+    scores: Mapping[str, paired.Scores],
+    differences: Sequence[paired.PlannerDifference],
 ) -> tuple[PlannerLine, ...]:
-    means = {planner: estimate_score(drives) for planner, drives in scores.items()}
+    means = {planner: paired.estimate_score(drives) for planner, drives in scores.items()}
     # Who is told apart comes first by that: a mean may be of fewer, easier drives.
     apart = [one for one in differences if one.is_apart]
     behind = Counter(one.second if one.estimate.mean > 0.0 else one.first for one in apart)
     ranked = sorted(means, key=lambda planner: (behind[planner], -means[planner].mean))
-    sets = find_sets(ranked, apart)
+    sets = paired.find_sets(ranked, apart)
     name = contestant.name if contestant else str(subject.label)
     line = partial(PlannerLine, name=name, contestant=contestant)
 

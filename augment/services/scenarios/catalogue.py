@@ -289,21 +289,14 @@ def _update_scenario(row: Scenario, wanted: dict[str, Any], actor: User | None) 
     seen = set(changed) - {"intent", "intent_origin"}
     of_practice = _handed_out(row).filter(split=Split.PRACTICE)
     is_other = row.intent is not None or seen or of_practice.exists()
-    if is_other and _is_in_use(row, wanted["follows"]):
+    # What it follows comes before it, so it is written anew after a new version of that.
+    is_before = wanted["follows"] is not None and wanted["follows"].pk > row.pk
+    if is_other and (is_before or row.augmentations.exists() or _handed_out(row).exists()):
         return CatalogueStep.RENEWED
     image = {"original_image": ""} if seen else {}
     Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
     log_change(row, "change", actor, after={"slug": row.slug, "changed": changed})
     return CatalogueStep.CHANGED
-
-
-def _is_in_use(row: Scenario, follows: Scenario | None) -> bool:
-    """Return whether a scenario can't change: it was asked or handed out, or would follow later.
-
-    What it follows comes before it, so it is written anew after a new version of that.
-    """
-    is_before = follows is not None and follows.pk > row.pk
-    return is_before or row.augmentations.exists() or _handed_out(row).exists()
 
 
 def _handed_out(row: Scenario) -> QuerySet[BenchmarkItem]:

@@ -132,13 +132,6 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
 
 
 @contextmanager
-def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
-    """Open a recording on this machine; as `open_file`."""
-    with open_file(row) as path:
-        yield UntrustedInput(path=path, format=row.asked_format or None)
-
-
-@contextmanager
 def open_file(row: SentFile) -> Iterator[Path]:
     """Copy a sent file to this machine; it is gone afterwards.
 
@@ -164,7 +157,8 @@ class Uploads(WorkKind[SceneUpload]):
 
     def run(self, row: SceneUpload, held: Lease[SceneUpload]) -> Settlement:
         """List what the file offers, and draw the moment that its format means."""
-        with open_upload(row) as source:
+        with open_file(row) as path:
+            source = UntrustedInput(path=path, format=row.asked_format or None)
             name, moments = source.moments(every_s=EVERY_S, most=MOST_STOPS + 1)
             if not moments:
                 raise InvalidDocument("recording", [("", "holds no moment with an ego")])
@@ -293,7 +287,8 @@ class Moments(WorkKind[UploadMoment]):
         """Draw it, or keep it; what can't be kept stays drawn."""
         is_new = row.state == MomentState.QUEUED
         try:
-            with open_upload(row.upload) as file:
+            with open_file(row.upload) as copied:
+                file = UntrustedInput(path=copied, format=row.upload.asked_format or None)
                 source, reading = file.read(
                     item=row.item or None, frame=row.frame, name="preview" if is_new else row.slug
                 )
