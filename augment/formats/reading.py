@@ -54,9 +54,6 @@ class Moment:
     frame: int = 0
     time_s: float | None = field(default=None, compare=False)
 
-    def __str__(self) -> str:
-        return f"frame {self.frame}" if self.item is None else f"{self.item}, frame {self.frame}"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:

@@ -126,22 +126,19 @@ class Polyline:
         # The end follows by itself: no second point in its place for rounding alone.
         if self.length_m - stations[-1] < 1e-6:
             stations = stations[:-1]
-        return self._at(np.concatenate([stations, [self.length_m]]))
+        return Polyline(self.points_at(np.concatenate([stations, [self.length_m]])))
 
     def between(self, start_m: float, end_m: float) -> Polyline:
         """The part from arc length `start_m` to `end_m` (clipped to the line)."""
         low, high = max(0.0, start_m), min(self.length_m, end_m)
         inner = self.stations_m[(self.stations_m > low) & (self.stations_m < high)]
-        return self._at(np.concatenate([[low], inner, [high]]))
+        return Polyline(self.points_at(np.concatenate([[low], inner, [high]])))
 
     def points_at(self, stations_m: FloatArray) -> FloatArray:
         """The points (N, 2) at the arc lengths (N,), which are clipped to the line."""
         x = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
         y = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
         return np.column_stack([x, y])
-
-    def _at(self, stations_m: FloatArray) -> Polyline:
-        return Polyline(self.points_at(stations_m))
 
     @cached_property
     def _spans_m(self) -> FloatArray:

@@ -13,15 +13,7 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any, Generic, Self, TypeVar
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    Strict,
-    TypeAdapter,
-    ValidationError,
-)
+from pydantic import ConfigDict, Field, GetCoreSchemaHandler, Strict, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
 from augment.errors import InvalidDocument
@@ -97,12 +89,6 @@ Line = Annotated[
     Polyline,
     Listed(Annotated[list[PointPair], _SOME], Polyline, lambda line: line.points_m.tolist()),
 ]
-
-
-class Document(BaseModel):
-    """Strict, closed, finite: a file's shape that no value of ours has."""
-
-    model_config = CLOSED | ConfigDict(strict=True, frozen=True)
 
 
 Value = TypeVar("Value")

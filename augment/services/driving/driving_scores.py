@@ -51,12 +51,12 @@ class DrivingLine:
     drives: int
     failed: int
     mean: float | None
-    before: float | None
+    before: float | None = None
     by_type: dict[str, float | None]
-    least_clearance_m: float | None
-    close: int | None
+    least_clearance_m: float | None = None
+    close: int | None = None
     collided: int
-    braked: int | None
+    braked: int | None = None
     driven_by: str = ""
 
     @property
@@ -253,12 +253,8 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
             drives=len(done),
             failed=len(cell) - len(done),
             mean=_mean(scored),
-            before=None,
             by_type={kind: _mean(scored, kind) for kind in kinds},
-            least_clearance_m=None,
-            close=None,
             collided=sum(row.parts.get(_NO_COLLISION) not in (None, 1.0) for row in done),
-            braked=None,
             driven_by=planner,
         )
 

@@ -161,6 +161,8 @@ def export_rows(
 def _cell(name: str, row: Augmentation, *, many: bool, moves: bool) -> writing.Cell:
     scenario, scene = row.scenario, row.scenario.base_scene
     loaded, modification = LoadedScenario(scenario), modification_from_document(row.modification)
+    # Who drives by interPlan's rules goes as they expect it.
+    is_ruled = moves and loaded.scene.options.interplan is not None
     source = None
     if scene.source == nuplan_log.NuPlan.name and scene.source_item:
         source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
@@ -173,7 +175,7 @@ def _cell(name: str, row: Augmentation, *, many: bool, moves: bool) -> writing.C
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
         recording=loaded.recording,
-        expected=loaded.expect_by_rules(modification) if moves else None,
+        expected=loaded.expect(loaded.scene, modification) if is_ruled else None,
         augmentation=str(row.code),
         contestant=row.contestant.slug,
         source=source,

@@ -397,12 +397,6 @@ class LoadedScenario:
         """Return `expect_recording` of the scenario's scene."""
         return expect_recording(scene, modification, self.recording)
 
-    def expect_by_rules(self, modification: entities.Modification) -> Recording | None:
-        """Return the tracks of who drives by interPlan's rules, None where nobody does."""
-        if self.scene.options.interplan is None:
-            return None
-        return self.expect(self.scene, modification)
-
 
 def scene_key(scenario: Scenario) -> str:
     """A digest of all that a scene is read from; two scenarios of one key have the same scene."""
