@@ -198,8 +198,7 @@ def read_entry(
     Raises:
         InvalidDocument: An object is nowhere near the scene.
     """
-    ground, left_out = Ground.of(scene), list[str]()
-    added: list[TrafficAgent] = []
+    ground, added, left_out = Ground.of(scene), list[TrafficAgent](), list[str]()
 
     def place(x_m: float, y_m: float, key: str, number: int) -> entities.Point:
         x_m, y_m = _to_local(scene, x_m, y_m)
