@@ -307,9 +307,7 @@ def _report(cell: Cell, report: LossReport) -> None:
     names = [other.agent.id for other in moving if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
     ways, unknown = scene.connectors, TrafficLight.UNKNOWN
-    turned = [
-        connector.id for connector in ways if connector.turn_type is entities.TurnType.U_TURN
-    ]
+    turned = [way.id for way in ways if way.turn_type is entities.TurnType.U_TURN]
     report.lose_of(turned, "a U-turn becomes a turn to the left")
     entered = [connector.id for connector in ways if connector.from_lane is None]
     report.lose_of(entered, "its turn type is not said: no lane leads into it")
