@@ -203,15 +203,13 @@ def sender_of(kind: WorkKind[Any], owner: str) -> Callable[[int], int]:
 
 
 enqueue_job = sender_of(AUGMENTATIONS, "job")
-enqueue_judge = sender_of(JUDGEMENTS, "run")
 enqueue_moments = sender_of(MOMENTS, "upload")
-enqueue_sweep = sender_of(DRIVES, "swept__sweep")
 SENDERS: dict[type[Model], Callable[[int], object]] = {
     BaseScene: partial(send, draw, "scene"),
     GenerationJob: enqueue_job,
-    JudgeRun: enqueue_judge,
+    JudgeRun: sender_of(JUDGEMENTS, "run"),
     Scenario: partial(send, draw, "scenario"),
-    Sweep: enqueue_sweep,
+    Sweep: sender_of(DRIVES, "swept__sweep"),
 }
 """What is sent for a row that is no work itself: its work, or that its pictures are drawn."""
 

@@ -3,7 +3,7 @@
 import hashlib
 import secrets
 from datetime import datetime
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from django.conf import settings
 from django.db import models
@@ -255,8 +255,3 @@ class StudyDraft(CodedModel):
     def name(self) -> str:
         """Name of the future study; may be empty."""
         return str(self.entered.get("name", ""))
-
-    def names_in(self, field: str) -> list[str]:
-        """Return the names chosen in a field."""
-        names: Any = self.entered.get(field, [])
-        return list(names)

@@ -183,7 +183,7 @@ def find_missing(draft: StudyDraft) -> list[str]:
     return [
         name
         for field, allowed in choices.items()
-        for name in draft.names_in(field)
+        for name in draft.entered.get(field, ())
         if name not in allowed
     ]
 

@@ -247,9 +247,7 @@ def _take_on(study: Study, enrolment: Enrolment, ids: Mapping[str, str]) -> Enro
 
 
 @transaction.atomic
-def drop_silent(
-    *, enrolment: Enrolment, now: datetime | None = None, actor: User | None = None
-) -> int:
+def drop_silent(*, enrolment: Enrolment, now: datetime | None = None) -> int:
     """Free the places of those who were silent for too long and are not done.
 
     Their votes stay; newcomers get what they have not judged, because it is planned least.
@@ -261,7 +259,7 @@ def drop_silent(
     at = now or timezone.now()
     silent = list(find_silent(enrolment, now=at))
     for voter in silent:
-        _drop(study, voter, at=at, actor=actor)
+        _drop(study, voter, at=at, actor=None)
     return len(silent)
 
 

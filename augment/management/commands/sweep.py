@@ -11,7 +11,7 @@ from augment.services.driving.thresholds import SweepResult, sweep_result
 from augment.services.inputs import read_request
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_sweep
+from augment.tasks import check_broker, enqueue_row
 
 
 class Command(TerminalCommand):
@@ -45,7 +45,7 @@ class Command(TerminalCommand):
             check_broker()
         sweep = plan_sweep(scenario=scenario, request=request, also=also)
         if options["queue"]:
-            transaction.on_commit(lambda: enqueue_sweep(sweep.pk))
+            transaction.on_commit(lambda: enqueue_row(sweep))
             self.stdout.write(f"{sweep_result(sweep).planned} drives wait for the workers.")
             return
         waiting = [drive.pk for line in sweep_result(sweep).lines for drive in line.drives]

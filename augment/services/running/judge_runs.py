@@ -5,7 +5,6 @@ with its calls as `ModelCall` rows. What a judge says is no vote and is rated no
 """
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
@@ -163,19 +162,12 @@ def finish_judges(*, now: clock.Moment = clock.DATABASE_TIME) -> None:
 
 
 class Judgements(work.WorkKind[PairJudgement]):
-    """Pairs that a judge is to compare.
-
-    Args:
-        client: How the endpoint is reached; None over the wire.
-    """
+    """Pairs that a judge is to compare."""
 
     model = PairJudgement
     queue = "models"
     priority = 6
     related = ("run__endpoint", "left__scenario")
-
-    def __init__(self, client: AbstractContextManager[ChatClient] | None = None) -> None:
-        self._client = client
 
     def waiting(self) -> QuerySet[PairJudgement]:
         """Return waiting judgements; none of a run that was cancelled or stopped at its cap."""
@@ -194,7 +186,7 @@ class Judgements(work.WorkKind[PairJudgement]):
         queue = Queue(still_wanted=transcript.insist)
         pictures = _read_shown(row.run, row.left_image), _read_shown(row.run, row.right_image)
         columns: dict[str, str] = {}
-        with self._client or EndpointClient(wire_to(endpoint), endpoint, queue) as client:
+        with EndpointClient(wire_to(endpoint), endpoint, queue) as client:
             for order, shown in (("first", pictures), ("second", pictures[::-1])):
                 better, reason = _ask(row, shown, client, transcript)
                 columns |= {order: better, f"{order}_reason": reason}
