@@ -56,24 +56,16 @@ class MarkStyle:
 
     fill: Colour
     outline: Colour
-    detail: Colour
-    hatch: Colour | None
+    detail: Colour = PAPER
+    hatch: Colour | None = None
     outline_px: float
 
 
-EGO_MARK = MarkStyle(
-    fill=(218, 30, 40), outline=(122, 8, 16), detail=(255, 255, 255), hatch=None, outline_px=2.0
-)
+EGO_MARK = MarkStyle(fill=(218, 30, 40), outline=(122, 8, 16), outline_px=2.0)
 CHANGED_MARK = MarkStyle(
-    fill=(20, 62, 192),
-    outline=(6, 22, 92),
-    detail=(255, 255, 255),
-    hatch=(122, 160, 245),
-    outline_px=3.5,
+    fill=(20, 62, 192), outline=(6, 22, 92), hatch=(122, 160, 245), outline_px=3.5
 )
-OTHER_MARK = MarkStyle(
-    fill=(164, 168, 174), outline=(84, 88, 94), detail=(255, 255, 255), hatch=None, outline_px=1.5
-)
+OTHER_MARK = MarkStyle(fill=(164, 168, 174), outline=(84, 88, 94), outline_px=1.5)
 
 
 def inks() -> dict[Colour, int]:

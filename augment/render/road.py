@@ -14,7 +14,7 @@ from augment.render.palette import Colour
 from augment.render.shapes import lane_ring, long_axis, offset, resample_line, runs, sides, stripes
 from augment.scene import entities
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AnyLane, AreaKind, Lane, LaneConnector, Scene, TrafficLight
+from augment.scene.entities import AnyLane, AreaKind, Lane, LaneConnector, Scene, TurnType
 from augment.scene.lane_graph import LaneGraph
 
 GRID_M = 5.0
@@ -36,16 +36,11 @@ _INSET_M = 0.1
 _OWN_M = 60.0
 _OWN_ASIDE_M, _OWN_TURN_RAD = 1.0, math.radians(20.0)
 _LIGHTS = {
-    TrafficLight.RED: palette.LIGHT_RED,
-    TrafficLight.YELLOW: palette.LIGHT_YELLOW,
-    TrafficLight.GREEN: palette.LIGHT_GREEN,
+    entities.TrafficLight.RED: palette.LIGHT_RED,
+    entities.TrafficLight.YELLOW: palette.LIGHT_YELLOW,
+    entities.TrafficLight.GREEN: palette.LIGHT_GREEN,
 }
-_LEFT_TO_RIGHT = (
-    entities.TurnType.U_TURN,
-    entities.TurnType.LEFT,
-    entities.TurnType.STRAIGHT,
-    entities.TurnType.RIGHT,
-)
+_LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
 _LAMP_PX = 5.5
 # Ahead of the ego's centre.
 _GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
@@ -118,9 +113,7 @@ def draw_signals(ground: Canvas, scene: Scene) -> None:
             connectors, key=lambda connector: _LEFT_TO_RIGHT.index(connector.turn_type)
         )
         # The straightest way leaves its lane most squarely, so the bar is laid across that one.
-        first = min(
-            ordered, key=lambda connector: connector.turn_type is not entities.TurnType.STRAIGHT
-        )
+        first = min(ordered, key=lambda connector: connector.turn_type is not TurnType.STRAIGHT)
         start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
         states = list(dict.fromkeys(connector.traffic_light for connector in ordered))
         part_m = width_m / len(states)
@@ -351,15 +344,15 @@ def _alike(pose: Pose, other: Pose) -> bool:
     return near and abs(difference(pose.heading_rad, other.heading_rad)) < math.radians(40.0)
 
 
-def _lamp(ground: Canvas, centre: FloatArray, state: TrafficLight) -> None:
+def _lamp(ground: Canvas, centre: FloatArray, state: entities.TrafficLight) -> None:
     """Draw a lamp whose shape says the state as well: a square, a diamond, a circle."""
-    if state is TrafficLight.GREEN:
+    if state is entities.TrafficLight.GREEN:
         x, y = centre.tolist()
         ground.disc((x, y), _LAMP_PX + 1.5, palette.PAPER)
         ground.disc((x, y), _LAMP_PX, _LIGHTS[state])
         return
     # A diamond is a square on its corner; the red square stands upright in the picture.
-    first_rad = math.pi / 4.0 if state is TrafficLight.RED else 0.0
+    first_rad = math.pi / 4.0 if state is entities.TrafficLight.RED else 0.0
     corners_rad = first_rad + np.arange(4) * math.pi / 2.0
     square = np.column_stack([np.cos(corners_rad), np.sin(corners_rad)])
     ground.fill(centre + square * (1.25 * _LAMP_PX + 2.0), palette.PAPER)

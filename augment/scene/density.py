@@ -17,18 +17,14 @@ from augment.geometry.frames import Pose, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene import entities
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import AgentType, LaneConnector, Scene, TrafficAgent
+from augment.scene.entities import AgentType, LaneConnector, Scene, TrafficAgent, TrafficDensity
 from augment.scene.lane_graph import LaneGraph
 
 FIRST_ID = 101
 """Spawned agents are numbered from here, so that the ids of a change stay clear of them."""
 # Gaps are whole metres, as interPlan draws them.
 NARROWEST_M = 10
-WIDEST_M = {
-    entities.TrafficDensity.HIGH: 33,
-    entities.TrafficDensity.MEDIUM: 50,
-    entities.TrafficDensity.LOW: 100,
-}
+WIDEST_M = {TrafficDensity.HIGH: 33, TrafficDensity.MEDIUM: 50, TrafficDensity.LOW: 100}
 """No gap is as wide as this."""
 BEYOND_M = 50.0
 ACCEL_MPS2, DECEL_MPS2 = 1.0, 2.0
@@ -53,7 +49,7 @@ class SpawnedTraffic:
 
 def spawn_traffic(
     scene: Scene,
-    density: entities.TrafficDensity,
+    density: TrafficDensity,
     *,
     rng: random.Random,
     boxes_m: Iterator[tuple[float, float]] = _USUAL_M,
@@ -71,7 +67,7 @@ def spawn_traffic(
         extras: Place and speed of vehicles that a scenario names one by one; each is put on the
             nearest lane.
     """
-    if density is entities.TrafficDensity.NONE:
+    if density is TrafficDensity.NONE:
         return SpawnedTraffic()
     graph = LaneGraph(scene)
     blocks = [find_ego_lane(scene, graph), *(graph.under(*place) for place in roadblocks_m)]

@@ -19,7 +19,7 @@ from augment.formats.writing import CannotExpress, Cell, Loss, LossReport, Outpu
 from augment.geometry.frames import difference, wrap
 from augment.scene import entities
 from augment.scene.density import is_bus
-from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, ScenarioType, Scene, TrafficAgent
 
 WORKER_STEP_M = 1.0
 USUAL_WALK_M = 12.0
@@ -116,7 +116,7 @@ def _list_numbers(entries: Sequence["_Entry"]) -> list[str]:
 class _Entry:
     """One special scenario while it is written."""
 
-    def __init__(self, cell: Cell, kind: entities.ScenarioType) -> None:
+    def __init__(self, cell: Cell, kind: ScenarioType) -> None:
         self.cell, self.kind = cell, kind
         self.source = cell.source or InterplanSource(token=interplan.scene_token(cell.scene.name))
         self.token = self.source.token
@@ -198,21 +198,19 @@ class _Entry:
         yaw_rad = wrap(agent.heading_rad + self.cell.scene.origin.pose.heading_rad)
         return [*place, round(yaw_rad, 6)]
 
-    def _walk_end(self, agent: TrafficAgent) -> Point:
+    def _walk_end(self, agent: TrafficAgent) -> entities.Point:
         """Return the end of a walk; a standing worker takes a step, others cross a road."""
         start = agent.x_m, agent.y_m
         if agent.walk_to_m is not None and math.dist(start, agent.walk_to_m) >= _NO_WALK_M:
             return agent.walk_to_m
-        stands = (
-            agent.walk_to_m is not None or self.kind is entities.ScenarioType.CONSTRUCTION_ZONE
-        )
+        stands = agent.walk_to_m is not None or self.kind is ScenarioType.CONSTRUCTION_ZONE
         length_m = WORKER_STEP_M if stands else USUAL_WALK_M
         return (
             agent.x_m + length_m * math.cos(agent.heading_rad),
             agent.y_m + length_m * math.sin(agent.heading_rad),
         )
 
-    def _global(self, point: Point) -> tuple[float, float]:
+    def _global(self, point: entities.Point) -> tuple[float, float]:
         x_m, y_m = self.cell.scene.origin.pose.to_parent(np.array([point]))[0]
         return round(float(x_m), 4), round(float(y_m), 4)
 

@@ -31,7 +31,7 @@ from augment.scene import planned_motion as planned
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import find_motion
-from augment.scene.planned_motion import AtTime, LanePath, PlannedMotion, PointPath
+from augment.scene.planned_motion import AtPlace, AtTime, LanePath, PlannedMotion, PointPath
 from augment.scene.planned_mover import HeldCourse, lane_line, way_and_speed
 from augment.scene.recording import Recording
 
@@ -93,11 +93,7 @@ class Stage:
         needed, name = dict[str, TrafficAgent](), agent.id
         while name in by_id and name not in needed:
             needed[name], motion = by_id[name], by_id[name].motion
-            name = (
-                motion.start.agent_id
-                if motion and isinstance(motion.start, planned.AtPlace)
-                else ""
-            )
+            name = motion.start.agent_id if motion and isinstance(motion.start, AtPlace) else ""
         self._expect(replace(self.scene, agents=tuple(needed.values())))
 
     def find_start(
