@@ -179,13 +179,9 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
     distance_m = line.project(0.0, 0.0).distance_m
     if distance_m > reach_m:
         return None
+    width_m = round(width_m, 3)
     return Strip(
-        segment=segment,
-        line=line,
-        left=left,
-        right=right,
-        width_m=round(width_m, 3),
-        distance_m=distance_m,
+        segment=segment, line=line, left=left, right=right, width_m=width_m, distance_m=distance_m
     )
 
 

@@ -50,12 +50,6 @@ _SIDE_OF = {
     entities.TurnType.LEFT: "successorsLeft",
     entities.TurnType.U_TURN: "successorsLeft",
 }
-_COLOURS = {
-    TrafficLight.GREEN: "green",
-    TrafficLight.YELLOW: "yellow",
-    TrafficLight.RED: "red",
-    TrafficLight.UNKNOWN: "inactive",
-}
 _NAMES = "Our names and the ids here:"
 Ids = Mapping[str, int]
 """Whole numbers from 1 on, a new one for each name that is asked for."""
@@ -160,7 +154,8 @@ def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
     for connector in scene.connectors:  # the state of t0 for as long as the scenario goes on
         if connector.traffic_light is not TrafficLight.NONE:
             duration = _tag("duration", len(cell.motion.times_s))
-            colour = _tag("color", _COLOURS[connector.traffic_light])
+            is_dark = connector.traffic_light is TrafficLight.UNKNOWN
+            colour = _tag("color", "inactive" if is_dark else connector.traffic_light.value)
             place = _point("point", connector.centerline.points_m[0])
             yield _tag(
                 "trafficLight",

@@ -39,12 +39,6 @@ _BECOMES = {
     kind: f"a {kind} becomes a {_TYPES[kind]}"
     for kind in (AgentType.BUS, AgentType.CONSTRUCTION_SIGN)
 }
-_LIGHTS = {
-    TrafficLight.GREEN: "TRAFFIC_LIGHT_GREEN",
-    TrafficLight.YELLOW: "TRAFFIC_LIGHT_YELLOW",
-    TrafficLight.RED: "TRAFFIC_LIGHT_RED",
-    TrafficLight.UNKNOWN: "TRAFFIC_LIGHT_UNKNOWN",
-}
 _AREAS = {AreaKind.CROSSWALK: "CROSSWALK", AreaKind.WALKWAY: "ROAD_EDGE_SIDEWALK"}
 _HEIGHTS_M = {
     AgentType.PEDESTRIAN: 1.789,
@@ -165,7 +159,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
     start = connector.centerline.points_m[0]
     return {
         "type": "TRAFFIC_LIGHT",
-        "state": {"object_state": [_LIGHTS[connector.traffic_light]] * steps},
+        "state": {"object_state": [f"TRAFFIC_LIGHT_{connector.traffic_light.name}"] * steps},
         "lane": connector.id,
         "stop_point": np.array([*start]),  # MetaDrive takes two of three, ScenarioMax two alone
         "metadata": {"type": "TRAFFIC_LIGHT", "object_id": connector.id, "dataset": DATASET},
