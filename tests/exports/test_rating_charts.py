@@ -111,10 +111,10 @@ def test_a_worker_draws_the_charts_and_pages_only_read_them(
     snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert tasks is not None  # registers what a worker draws
-    monkeypatch.setattr("arena.results.exports.charts.write_figure", write_quickly)
+    monkeypatch.setattr("arena.exports.drawing.write_figure", write_quickly)
     draw, what = sending.send_charts.args  # the message
     draw(what, snapshot.pk)
-    monkeypatch.setattr("arena.results.exports.charts.write_figure", None)
+    monkeypatch.setattr("arena.exports.drawing.write_figure", None)
     reader = signed_in(people()["researcher"])
     for name, form in product(("leaderboard", *CHARTS), BEGINS):
         address = reverse("results-export", args=[snapshot.study.code, name, form])
