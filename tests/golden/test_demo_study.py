@@ -22,7 +22,7 @@ from pytest_django import Settings
 
 from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
-from arena.management.commands.demo import vote_and_rate
+from arena.management.commands.demo import open_for_votes, vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
 from arena.results.exports.study_folder import MANIFEST, write_study
@@ -108,7 +108,9 @@ def demo_folder(steady_rows: None, tmp_path: Path, settings: Settings) -> Path:
     for person in Person.objects.all():
         person.code = uuid.uuid5(uuid.NAMESPACE_URL, person.user.username)
         person.save()
-    vote_and_rate([f"place-{number:02d}" for number in range(PLACES)], tmp_path / "tables")
+    scenarios = [f"place-{number:02d}" for number in range(PLACES)]
+    vote_and_rate(scenarios, tmp_path / "tables")
+    open_for_votes(scenarios)
     return tmp_path / "tables"
 
 

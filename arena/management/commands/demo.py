@@ -132,6 +132,8 @@ class Command(TerminalCommand):
                 look = partial(_look_at, supervisor)
                 for job in jobs:  # the last one's scenarios are those of the studies
                     scenarios = finish(job, say, look)
+                name = open_for_votes(scenarios, own)
+                say(f"“{name}” is open for votes after {time.monotonic() - started:.0f} s.")
                 text, files = vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
                 send_charts(Snapshot.objects.latest("made_at").pk)
                 drives = start_drives()
@@ -185,6 +187,11 @@ class OwnModel:
     name: str
     contestants: tuple[str, ...]
     probe_calls: int
+
+    @property
+    def rated(self) -> tuple[str, ...]:
+        """Who is compared: its contestants beside the demo's."""
+        return (*demo.RATED, *self.contestants)
 
 
 def prepare(say: Callable[[str], None]) -> None:
@@ -328,19 +335,25 @@ def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
         time.sleep(0.2)
 
 
+def open_for_votes(scenarios: list[str], own: OwnModel | None = None) -> str:
+    """Open the study that people try voting in; return its name."""
+    if own is None:
+        open_to_try(OPEN_STUDY, *choose_visible(scenarios))
+        return OPEN_STUDY
+    # Of a few pairs most are decided already.
+    open_to_try(OPEN_STUDY_WITH_MODEL, own.rated, scenarios, 2 * len(scenarios))
+    return OPEN_STUDY_WITH_MODEL
+
+
 def vote_and_rate(
     scenarios: list[str], folder: Path, own: OwnModel | None = None
 ) -> tuple[str, list[Path]]:
     """Return the table of a study with simulated votes, and the files that it is written to."""
     if own is None:
         study = demo.hold_study(scenarios=scenarios)
-        open_to_try(OPEN_STUDY, *choose_visible(scenarios))
     else:
         name = f"Demo with {own.name[:80]} (simulated votes)"
-        rated = (*demo.RATED, *own.contestants)
-        study = demo.hold_study(scenarios=scenarios, name=name, contestants=rated)
-        # Of a few pairs most are decided already.
-        open_to_try(OPEN_STUDY_WITH_MODEL, rated, scenarios, 2 * len(scenarios))
+        study = demo.hold_study(scenarios=scenarios, name=name, contestants=own.rated)
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []
