@@ -49,8 +49,8 @@ def main() -> None:
     def repeat(path: str) -> float:
         return statistics.median(visit(path)[0] for _ in range(AGAIN))
 
-    visit("/login")
-    login_s = repeat("/login")
+    visit("/login/")
+    login_s = repeat("/login/")
     client.force_login(User.objects.get(username="admin"))
     visit("/")
     known, waiting, kinds, rows = {"/"}, deque(["/"]), Counter[str](), []
