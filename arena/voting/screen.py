@@ -187,7 +187,10 @@ def _times_today(study: Study, expert: User) -> list[int | None]:
 
 
 def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
-    vote = own_votes(study, expert).filter(key=read_code(key)).first()
+    code = read_code(key)
+    if not code.int:  # voters choose their keys, so that a vote may have even this one
+        return None
+    vote = own_votes(study, expert).filter(key=code).first()
     if vote is None:
         return None
     if study.ask_why:
