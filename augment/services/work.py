@@ -298,8 +298,7 @@ class WorkKind(ABC, Generic[Row]):
                 wait_out(partial(held.release, reason=f"The database was locked: {error}"))
                 return False
             logger.exception("Work on %s broke.", held)
-            reason = f"unexpected: {type(error).__name__}: {error}"
-            held.settle(Settlement(state=FAILED, reason=reason))
+            held.settle(Settlement(state=FAILED, reason=reason_sentence(error)))
         except BaseException:
             held.release()
             raise
@@ -364,8 +363,13 @@ def register(*kinds: WorkKind[Any]) -> None:
     KINDS.update({kind.name: kind for kind in kinds})
 
 
-def reason_sentence(error: errors.AugmentError) -> str:
-    """Return the reason of a failure, with the HTTP status if there was one."""
+def reason_sentence(error: Exception) -> str:
+    """Return the reason of a failure, with the HTTP status if there was one.
+
+    What is no fault of ours with a sentence is told by its class as well.
+    """
+    if not isinstance(error, errors.AugmentError):
+        return f"unexpected: {type(error).__name__}: {error}"
     text, status = str(error), getattr(error, "status", None)
     return text if status is None or str(status) in text else f"HTTP {status}: {text}"
 

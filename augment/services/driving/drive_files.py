@@ -17,6 +17,7 @@ from augment.errors import AugmentError, Conflict
 from augment.formats.documents import read_json
 from augment.scene import codec
 from augment.services.driving.simulations import NUPLAN, Options, drive_document, load_planner
+from augment.services.work import reason_sentence
 from augment.simulation.drive import find_expert, run
 from augment.simulation.score import ScoreKind, score_drive
 from augment.simulation.trace import FORMAT
@@ -66,14 +67,11 @@ def drive_files(
         result = out / f"{name}.drive.json"
         try:
             document = _drive(_setting(source, name, options), options)
-        except AugmentError as error:
-            result.unlink(missing_ok=True)
-            yield name, str(error)
-            continue
         except Exception as error:  # a planner from outside may raise anything
+            if not isinstance(error, AugmentError):
+                logger.exception("Driving %s broke.", name)
             result.unlink(missing_ok=True)
-            logger.exception("Driving %s broke.", name)
-            yield name, f"unexpected: {type(error).__name__}: {error}"
+            yield name, reason_sentence(error)
             continue
         text = json.dumps({"scenario": name, **document}, indent=1, sort_keys=True) + "\n"
         scratch = out / f".{name}.{part}"

@@ -245,7 +245,9 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
     for (_, _, planner), cell in sorted(cells.items()):
         contestant = cell[0].augmentation.contestant
         done = [row for row in cell if row.score is not None]
-        scored = [(row.augmentation.scenario.type, row.score or 0.0) for row in done]
+        scored = [
+            (row.augmentation.scenario.type, row.score) for row in cell if row.score is not None
+        ]
         yield DrivingLine(
             subject=Subject.AUGMENTATION,
             name=f"{contestant.name}, driven in nuPlan by {planner}",

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from uuid import UUID
 
 from django.db import transaction
 
@@ -13,6 +12,7 @@ from augment.formats.interplan.runs import TOKENS, read_tokens
 from augment.formats.nuplan_results import NuplanDrive, read_results
 from augment.models import Augmentation, GenerationJob, NuplanResult
 from augment.services.events import log_change
+from augment.services.texts import read_code
 from augment.simulation.score import ScoreKind
 
 
@@ -46,7 +46,7 @@ def import_results(*, tokens: Path, folders: Sequence[Path]) -> ImportedResults:
     scenarios = read_tokens(tokens.read_bytes())
     drives = [drive for folder in folders for drive in read_results(folder)]
     _check_once(drives)
-    codes = {name: code for name, text in scenarios.items() if (code := _find_code(text))}
+    codes = {name: read_code(text) for name, text in scenarios.items()}
     rows = Augmentation.objects.filter(code__in=set(codes.values())).defer("modification")
     by_code = {row.code: row for row in rows}
     by_scenario = {name: by_code[code] for name, code in codes.items() if code in by_code}
@@ -84,10 +84,3 @@ def _check_once(drives: Sequence[NuplanDrive]) -> None:
         if number > 1:
             problem = f"is there {number} times for the planner {planner}; give one run of each"
             raise InvalidDocument("nuPlan results", [(scenario, problem)])
-
-
-def _find_code(text: str) -> UUID | None:
-    try:
-        return UUID(text)
-    except ValueError:
-        return None
