@@ -269,7 +269,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 def start_recovering(**_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
     workers.stopping.clear()
-    presence = workers.Presence(f"{socket.gethostname()} {os.getpid()}")
+    presence = workers.Presence(f"{socket.gethostname()} {os.getpid()}"[:120])
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
 

@@ -139,7 +139,7 @@ class WarnedDocument(serializers.Serializer[Any]):
 
 
 def keep_and_send(
-    keep: Callable[[], Row], send: Callable[[Row], object] | None = None
+    keep: Callable[[], Row], send: Callable[[], object] | None = None
 ) -> tuple[Row, list[str]]:
     """Write a row and, once that is committed, queue its work.
 

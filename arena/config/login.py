@@ -22,11 +22,13 @@ class LoginLimit(AxesDatabaseHandler):  # type: ignore[misc] # untyped
         """Return the failures of the account here; the limit if the address reached its own."""
         failures = int(super().get_failures(request, credentials))
         address = getattr(request, "axes_ip_address", None)
+        if address is None:
+            return failures
         recent = AccessAttempt.objects.filter(
             ip_address=address, attempt_time__gt=get_cool_off_threshold(request)
         )
         total = recent.aggregate(total=Sum("failures_since_start"))["total"] or 0
-        if address is None or total < settings.ADDRESS_FAILURE_LIMIT:
+        if total < settings.ADDRESS_FAILURE_LIMIT:
             return failures
         return max(failures, int(get_failure_limit(request, credentials)))
 

@@ -44,11 +44,6 @@ class BoardLine(Line):
     withdrawn: int | None = None
     is_provisional: bool = False
 
-    @property
-    def model(self) -> str:
-        """The name, with "(simulated)" where that is so."""
-        return f"{self.name}{' (simulated)' * self.is_simulated}"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledStudy:

@@ -124,7 +124,7 @@ class SnapshotsView(views.ApiView):
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
             snapshot = rate(study=study, **choices)
-            views.keep_and_send(lambda: snapshot, lambda row: send_charts(row.pk))
+            views.keep_and_send(lambda: snapshot, partial(send_charts, snapshot.pk))
             return snapshot
         plan = partial(plan_snapshot, study=study, **choices)
         planned, warnings = views.keep_and_send(plan)

@@ -121,9 +121,7 @@ def ask(request: HttpRequest, question: Confirmation) -> HttpResponse:
     return render(request, "ask.html", context, status=422 if is_mistyped else 200)
 
 
-def send_later(
-    request: HttpRequest, row: Row, send: Callable[[Row], object] | None = None
-) -> None:
+def send_later(request: HttpRequest, row: Row, send: Callable[[], object] | None = None) -> None:
     """Send workers what a row needs on commit; a fault of the queue becomes a message."""
     send_on_commit(row, partial(messages.warning, request), send)
 

@@ -101,7 +101,8 @@ def answer_once(
 def digest_body(body: object) -> str:
     """Return the hash of a body: JSON, or the fields and files of a form.
 
-    With another secret key it is another one: an answer that can't be opened is not returned.
+    It depends on the secret key, so that a key sent again after a change of that is refused: the
+    answer can't be opened any more.
     """
     fields = dict(body.lists()) if isinstance(body, MultiValueDict) else body
     text = json.dumps(fields, sort_keys=True, default=_describe)

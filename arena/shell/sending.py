@@ -1,4 +1,4 @@
-"""Messages to workers, sent on commit; `arena.tasks` says how each kind of picture is drawn."""
+"""Messages to workers, sent on commit: what each row needs, and pictures."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,7 +20,7 @@ _AT_ONCE = 4
 
 
 def send_on_commit(
-    row: Row, tell: Callable[[str], object], send: Callable[[Row], object] | None = None
+    row: Row, tell: Callable[[str], object], send: Callable[[], object] | None = None
 ) -> None:
     """Send workers what a row needs on commit.
 
@@ -32,7 +32,7 @@ def send_on_commit(
 
     def send_now() -> None:
         try:
-            (send or enqueue_row)(row)
+            (send or partial(enqueue_row, row))()
         except QueueFault as error:
             tell(str(error))
 

@@ -36,10 +36,10 @@ def study_named(name_or_code: str) -> Study:
     Raises:
         UnknownName: There is none.
     """
-    return find_named(Study.objects.all(), "study", name_or_code)
+    return find_by_name_or_code(Study.objects.all(), "study", name_or_code)
 
 
-def find_named(rows: QuerySet[Row], what: str, name_or_code: str) -> Row:
+def find_by_name_or_code(rows: QuerySet[Row], what: str, name_or_code: str) -> Row:
     """Return the row of that name or code.
 
     Raises:

@@ -35,6 +35,7 @@ _MOST_BANDS = 20_000
 _MISSED_M = 0.1
 """A place that leads further from its point than this does not tell where the point is."""
 _SIGHTS = {
+    **dict.fromkeys((intents.Sight.VEHICLE, intents.Sight.PARKED, intents.Sight.MOVING), VEHICLES),
     intents.Sight.BUS: {entities.AgentType.BUS},
     intents.Sight.BICYCLE: {entities.AgentType.BICYCLE},
     intents.Sight.PEDESTRIAN: {entities.AgentType.PEDESTRIAN},
@@ -352,7 +353,7 @@ def _fits(
     lanes: LanesAcross, pick: intents.Pick, agent: entities.TrafficAgent, place: RoutePosition
 ) -> bool:
     stands = agent.is_stopped
-    if agent.type not in _SIGHTS.get(pick.kind, VEHICLES) or abs(place.left_m) > _BESIDE_M:
+    if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
         return False
     if stands is not {intents.Sight.PARKED: True, intents.Sight.MOVING: False}.get(
         pick.kind, stands

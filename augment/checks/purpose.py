@@ -156,7 +156,7 @@ def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:
 
 def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
     """Return the first step at which the ego sees any of its corners or its middle."""
-    # All but vehicles is too low or too slim to hide a pedestrian.
+    # Everything but vehicles is too low or too slim to hide a pedestrian.
     screens = [movement for movement in motion.others if movement.agent.type in VEHICLES]
     for step, ((x_m, y_m), state) in enumerate(
         zip(motion.ego.states[:, :2].tolist(), walker.states, strict=True)

@@ -137,7 +137,7 @@ def width_between(line: Polyline, left: Polyline, right: Polyline) -> float:
 
 
 def is_far(points: FloatArray, reach_m: float) -> bool:
-    """Return whether the points' bounding box lies away from the origin; not for NaN."""
+    """Return whether the bounding box is further than that from the origin; False for NaN."""
     if len(points) == 0:
         return True
     gap = np.maximum(np.maximum(points.min(axis=0), -points.max(axis=0)), 0.0)

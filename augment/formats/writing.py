@@ -163,17 +163,33 @@ def check_finite(cell: Cell) -> None:
             raise CannotExpress(f"{movement.agent.id} is at no finite place in step {broken[0]}")
 
 
+def choose_finite(cells: Sequence[Cell]) -> tuple[list[Cell], list[Loss]]:
+    """Return the cells whose numbers can be written, and the refusals of the others.
+
+    Every writer begins with it.
+    """
+    finite: list[Cell] = []
+    refused: list[Loss] = []
+    for cell in cells:
+        try:
+            check_finite(cell)
+        except CannotExpress as reason:
+            refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
+        else:
+            finite.append(cell)
+    return finite, refused
+
+
 def write_each(
     cells: Sequence[Cell], write_one: Callable[[Cell, LossReport], dict[str, bytes]]
 ) -> Output:
     """The cells one by one; what can't be expressed is refused by its name and reason."""
     files: dict[str, bytes] = {}
     losses: list[Loss] = []
-    refused: list[Loss] = []
-    for cell in cells:
+    finite, refused = choose_finite(cells)
+    for cell in finite:
         report = LossReport(cell)
         try:
-            check_finite(cell)
             files |= write_one(cell, report)
         except CannotExpress as reason:
             refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))

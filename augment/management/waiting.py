@@ -28,7 +28,7 @@ WAITING: Mapping[str, Mapping[str, Any]] = {
 
 
 def keep_and_enqueue(keep: Callable[[], Row]) -> Row:
-    """Write a row whose work begins as soon as it is committed.
+    """Write a row in a transaction, and send its work once that is committed.
 
     Raises:
         QueueFault: No broker, or it refuses; nothing is written.

@@ -43,7 +43,7 @@ def user_column(
 
 
 class CodedModel(models.Model):
-    """A row that addresses name by a random code."""
+    """A row whose addresses have its random code."""
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
 
@@ -55,7 +55,7 @@ class CodedModel(models.Model):
 
 
 class DoneState(models.TextChoices):
-    """State of work that is done or has failed at its end."""
+    """States of work that ends as done or failed."""
 
     QUEUED = "queued", "Waiting"
     RUNNING = "running", "Running"
@@ -63,7 +63,7 @@ class DoneState(models.TextChoices):
     FAILED = "failed", "Failed"
 
 
-class Work(models.Model):
+class Work(CodedModel):
     """A row that a worker takes, works on and settles; `augment.services.work` says how.
 
     In a state of `UNDER_WAY` the row waits until it has a `claim`, and is worked on while it has
@@ -79,7 +79,6 @@ class Work(models.Model):
     STARTED: ClassVar[Mapping[str, str]] = {"state": "running"}
     GIVEN_BACK: ClassVar[Mapping[str, str]] = {"state": "queued"}
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     state = models.CharField(max_length=20)
     reason = models.TextField(blank=True, help_text="why there is no result")
     claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -127,7 +127,9 @@ class TrafficAgent:
         size_m: tuple[float, float] | None = None,
         *,
         id: str = "",
-        **values: Any,
+        speed_mps: float = 0.0,
+        lane_id: str | None = None,
+        walk_to_m: schema.PointPair | None = None,
     ) -> TrafficAgent:
         """Return an agent at a pose, of its kind's usual size or of another length and width."""
         length_m, width_m = size_m or LENGTH_WIDTH_M[kind]
@@ -139,7 +141,9 @@ class TrafficAgent:
             heading_rad=pose.heading_rad,
             length_m=length_m,
             width_m=width_m,
-            **values,
+            speed_mps=speed_mps,
+            lane_id=lane_id,
+            walk_to_m=walk_to_m,
         )
 
     @property
@@ -374,7 +378,10 @@ class Modification:
         return any(agent.motion is not None for agent in self.changed)
 
     def with_changed(self, agents: Iterable[TrafficAgent]) -> Modification:
-        """Return the same with other changed agents; those that are moved here stay so."""
+        """Return the same with these as all its added and moved agents.
+
+        Those whose id is moved here stay moved, all others are added; who is left out is dropped.
+        """
         names = {agent.id for agent in self.moved}
         added, moved = list[TrafficAgent](), list[TrafficAgent]()
         for agent in agents:

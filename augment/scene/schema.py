@@ -29,9 +29,9 @@ class LabelEnum(StrEnum):
     label: str
 
     def __new__(cls, value: str, label: str = "") -> Self:
-        name = str.__new__(cls, value)
-        name._value_, name.label = value, label
-        return name
+        member = str.__new__(cls, value)
+        member._value_, member.label = value, label
+        return member
 
 
 CLOSED = ConfigDict(extra="forbid", allow_inf_nan=False)

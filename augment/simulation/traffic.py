@@ -348,7 +348,7 @@ class HeldDrivers(LaneDrivers):
 def _find_route(road: Road, agent: TrafficAgent) -> list[str]:
     """The ways that a driver follows from the one under it on."""
     name = lane_under(road, agent)
-    assert name is not None
+    assert name is not None, agent.id
     start_m = road.graph.lanes[name].centerline.project(agent.x_m, agent.y_m).s_m
     return road.graph.route(name, start_m + PATH_M)
 

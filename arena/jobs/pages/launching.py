@@ -138,7 +138,8 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
 
 def _like(request: HttpRequest) -> dict[str, Any]:
     """Return the values of another job where the address names one."""
-    job = GenerationJob.objects.filter(code=read_code(request.GET.get("like", ""))).first()
+    code = request.GET.get("like", "")
+    job = GenerationJob.objects.filter(code=read_code(code)).first() if code else None
     if job is None:
         return {}
     names = ("samples", "is_fresh", "cap_calls", "cap_tokens")

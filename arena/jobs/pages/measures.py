@@ -1,6 +1,7 @@
 """Pages of a job's measures: drives, displacement, analyses, and its files."""
 
 import uuid
+from functools import partial
 from typing import Any
 
 from django.contrib import messages
@@ -59,7 +60,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     )
     with refusals_told(request), transaction.atomic():
         waiting = simulations.plan_job(job=job, options=options)
-        send_later(request, job, lambda _job: enqueue_simulations(waiting))
+        send_later(request, job, partial(enqueue_simulations, waiting))
         drives = "drive is" if len(waiting) == 1 else "drives are"
         messages.success(request, f"{len(waiting)} {drives} queued.")
     return redirect("job-tab", code=code, tab="driving")
@@ -237,7 +238,7 @@ def ask_to_measure(request: HttpRequest, job: GenerationJob) -> int:
     """Return how many rows are still to be measured, and leave them to a worker."""
     unmeasured = count_unmeasured(job)
     if unmeasured and not looks_again(request):
-        send_later(request, job, lambda job: enqueue_measure(job.pk))
+        send_later(request, job, partial(enqueue_measure, job.pk))
     return unmeasured
 
 

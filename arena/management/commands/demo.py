@@ -132,8 +132,10 @@ class Command(TerminalCommand):
                 look = partial(_look_at, supervisor)
                 for job in jobs:  # the last one's scenarios are those of the studies
                     scenarios = finish(job, say, look)
-                name = open_for_votes(scenarios, own)
-                say(f"“{name}” is open for votes after {time.monotonic() - started:.0f} s.")
+                study = open_for_votes(scenarios, own)
+                if study.state == Study.State.OPEN:
+                    took_s = time.monotonic() - started
+                    say(f"“{study.name}” is open for votes after {took_s:.0f} s.")
                 text, files = vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
                 send_charts(Snapshot.objects.latest("made_at").pk)
                 drives = start_drives()
@@ -335,14 +337,12 @@ def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
         time.sleep(0.2)
 
 
-def open_for_votes(scenarios: list[str], own: OwnModel | None = None) -> str:
-    """Open the study that people try voting in; return its name."""
+def open_for_votes(scenarios: list[str], own: OwnModel | None = None) -> Study:
+    """Return the study that people try voting in, which is opened where it is not there."""
     if own is None:
-        open_to_try(OPEN_STUDY, *choose_visible(scenarios))
-        return OPEN_STUDY
+        return open_to_try(OPEN_STUDY, *choose_visible(scenarios))
     # Of a few pairs most are decided already.
-    open_to_try(OPEN_STUDY_WITH_MODEL, own.rated, scenarios, 2 * len(scenarios))
-    return OPEN_STUDY_WITH_MODEL
+    return open_to_try(OPEN_STUDY_WITH_MODEL, own.rated, scenarios, 2 * len(scenarios))
 
 
 def vote_and_rate(
@@ -397,8 +397,10 @@ def choose_visible(scenarios: list[str]) -> tuple[tuple[str, ...], list[str], in
     return best, shown, math.comb(len(best), 2) * len(shown)
 
 
-def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pairs: int) -> None:
-    """Open a study for the expert, with a film among the first three pairs if it has any.
+def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pairs: int) -> Study:
+    """Return a study for the expert, opened where it is not there.
+
+    A film is among the first three pairs if it has any.
 
     Args:
         name: Of the study.
@@ -406,8 +408,8 @@ def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pai
         scenarios: On what.
         pairs: At least so many can be shown.
     """
-    if Study.objects.filter(name=name).exists():
-        return
+    if earlier := Study.objects.filter(name=name).first():
+        return earlier
     votes = min(YOUR_VOTES, pairs)
     values = demo.study_asked(name, scenarios, contestants) | {"experts": ["expert"]}
     moves = models.Scenario.objects.filter(slug__in=scenarios, catalogue_set="moving").exists()
@@ -421,6 +423,7 @@ def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pai
                 break
             transaction.set_rollback(True)
     draw_pictures(study)
+    return study
 
 
 def login_lines() -> list[str]:

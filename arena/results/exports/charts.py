@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from arena.exports import drawing
+from arena.exports.cells import show_name
 from arena.models import Snapshot
 from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord, TypeRating
@@ -143,7 +144,7 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
             intervals = {line.slug: (line.lower, line.rating, line.upper) for line in part.lines}
             _draw_intervals(panel, rows, intervals)
             drawing.name_lines(
-                panel, [row.model for row in rows], [row.is_simulated for row in rows]
+                panel, [show_name(row) for row in rows], [row.is_simulated for row in rows]
             )
             _note_ranks(panel, rows, part)
             panel.set_title(f"{part.label} (n {part.votes - (part.settled or 0)})", fontsize=7)
@@ -172,7 +173,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
     shares = np.divide(scores, votes, out=np.full_like(scores, np.nan), where=votes > 0)
     with drawing.chart_style():
         side_in = 0.62 * max(len(rows), 2)
-        names_in = 0.6 + 0.08 * max((len(row.model) for row in rows), default=0)
+        names_in = 0.6 + 0.08 * max((len(show_name(row)) for row in rows), default=0)
         figure = Figure(figsize=(side_in + names_in, side_in + 0.9), layout="constrained")
         axes = figure.add_subplot()
         colours = LinearSegmentedColormap.from_list("score", _HEAT)
@@ -231,7 +232,7 @@ def _draw_intervals(
 
 def _name_ranked(axes: Axes, rows: Sequence[Row]) -> None:
     """Name the lines of a chart, each with its rank."""
-    names = [f"{row.model}  {row.rank or '–'}" for row in rows]
+    names = [f"{show_name(row)}  {row.rank or '–'}" for row in rows]
     drawing.name_lines(axes, names, [row.is_simulated for row in rows])
     edge = (0, 1), (-2, 2), "axes fraction", "offset points"
     axes.annotate("Rank", *edge, ha="right", color=drawing.SOFT)
@@ -249,7 +250,8 @@ def _note_ranks(axes: Axes, rows: Sequence[Row], part: TypeRating) -> None:
 
 def _draw_point(axes: Axes, point: Point) -> None:
     row, kind = point.row, point.model_class.replace("_", " ")
-    name = row.model if len(row.model) <= LONGEST_NAME else f"{row.model[: LONGEST_NAME - 1]}…"
+    name = show_name(row)
+    name = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
     drawing.draw_interval(
         axes,
         point.x,

@@ -281,7 +281,7 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
     """
     if not is_big(study):
         snapshot = rate_now(study=study, **choices)
-        acts.send_later(request, snapshot, lambda row: send_charts(row.pk))
+        acts.send_later(request, snapshot, partial(send_charts, snapshot.pk))
         return
     with transaction.atomic():
         planned = plan_snapshot(study=study, **choices)

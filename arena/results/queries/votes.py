@@ -173,7 +173,7 @@ class VoteSet:
     """Votes of a rating, in the order of their decisions.
 
     Attributes:
-        competitors: By slug; those of a file are stored nowhere.
+        competitors: By slug; those of a file are rows that are not stored, without a primary key.
         counted: The votes that count.
         repeats: Decided hidden repeats, whether they count or not.
         checks: Votes on attention checks by the primary question, and `references` who should win

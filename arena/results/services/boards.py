@@ -25,7 +25,7 @@ from arena.results.services.analysis import count_settled_ties, vote_arrays
 from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
 from arena.results.services.vote_files import vote_rows, votes_csv
-from arena.studies.queries import author_pairs, find_named
+from arena.studies.queries import author_pairs, find_by_name_or_code
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict
 from augment.models import Benchmark, Contestant, Scenario, Submission
@@ -93,7 +93,7 @@ def board_named(name_or_code: str) -> Board:
     Raises:
         UnknownName: There is none.
     """
-    return find_named(Board.objects.all(), "board", name_or_code)
+    return find_by_name_or_code(Board.objects.all(), "board", name_or_code)
 
 
 @transaction.atomic

@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from contextlib import closing
 from typing import Any, cast
 
@@ -62,21 +62,25 @@ def show_own_pictures(study: Study, *, pairs: int | None = None) -> None:
 
 def _claim(study: Study) -> Matchup | None:
     """Return a pair that nobody draws; who loses a claim by its age draws the same once more."""
-    while (row := _first_free(study)) is not None:
+    lost = set[int]()
+    while (row := _first_free(study, lost)) is not None:
         own = Matchup.objects.filter(pk=row.pk, view=row.view)
         if own.update(view={"since": database_now().timestamp()}):
             return row
+        lost.add(row.pk)
     return None
 
 
-def _first_free(study: Study) -> Matchup | None:
+def _first_free(study: Study, lost: Collection[int]) -> Matchup | None:
+    """Return the first pair that is not drawn and not claimed, of those that were not lost."""
     now = database_now().timestamp()
     rows = find_undrawn(study).order_by("position", "pk").only("code", "view")
-    # SQLite refuses a write of who still reads what others have changed since.
+    # SQLite refuses a write while this connection still reads what others have changed since.
     undrawn = cast(Generator[Matchup, None, None], rows.iterator(chunk_size=50))
     with closing(undrawn):
         for row in undrawn:
-            if not 0.0 <= now - (row.view or {}).get("since", 0.0) <= _CLAIM_S:
+            is_claimed = 0.0 <= now - (row.view or {}).get("since", 0.0) <= _CLAIM_S
+            if row.pk not in lost and not is_claimed:
                 return row
     return None
 

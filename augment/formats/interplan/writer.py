@@ -15,7 +15,7 @@ from augment.errors import Conflict
 from augment.formats.interplan import file as interplan
 from augment.formats.interplan.file import InterplanSource
 from augment.formats.interplan.runs import MODIFICATIONS, NuplanScenario, run_files
-from augment.formats.writing import CannotExpress, Cell, Loss, LossReport, Output, check_finite
+from augment.formats.writing import Cell, Loss, LossReport, Output, choose_finite
 from augment.geometry.frames import difference, wrap
 from augment.scene import entities
 from augment.scene.density import is_bus
@@ -48,13 +48,8 @@ def write(cells: Sequence[Cell]) -> Output:
     """
     entries: list[_Entry] = []
     losses: list[Loss] = []
-    refused: list[Loss] = []
-    for cell in cells:
-        try:
-            check_finite(cell)
-        except CannotExpress as reason:
-            refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
-            continue
+    finite, refused = choose_finite(cells)
+    for cell in finite:
         if cell.type is None:
             text = "interPlan has five types of scenarios, and this one is of another: left out"
             losses.append(Loss(cell=cell.name, text=text, changes_scene=True))
