@@ -31,6 +31,11 @@ def scenario_at(place: str) -> str:
     return place.partition(_SAMPLE)[0]
 
 
+def sample_at(place: str) -> int:
+    """The sample of a place, 0 where its scenario is judged as a whole."""
+    return int(place.partition(_SAMPLE)[2] or 0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """Contestant's picture of a scenario, which can be shown.

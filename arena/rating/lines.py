@@ -97,6 +97,13 @@ def votes_text(votes: int, settled: int | None) -> str:
     return f"{count_text(votes, 'vote|')}{ties}"
 
 
+def unshown_text(pairs: int, ties: str) -> str:
+    """Return how many pairs were not shown, and as what ties they count; empty: left out."""
+    was, is_, count = ("was", "is", "counts") if pairs == 1 else ("were", "are", "count")
+    end = f"{count} as {ties}" if ties else f"{is_} left out"
+    return f"{count_text(pairs, 'pair|')} that nobody can tell apart {was} not shown and {end}"
+
+
 def count_text(number: int, what: str) -> str:
     """A number of things, whose plural has an s in the place of |."""
     return f"{number} {what.replace('|', '' if number == 1 else 's')}"

@@ -68,7 +68,7 @@ class Agreement:
     ac1: Estimate = field(default=Estimate(value=None), metadata={"since": 3})
 
 
-def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
+def agreement(votes: Comparisons, *, rounds: int, seed: int, samples: int = 1) -> Agreement:
     """Agreement of all experts on the units that several of them judged.
 
     Args:
@@ -76,6 +76,7 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
             expert's.
         rounds: Of the bootstrap over scenarios.
         seed: Of its draws.
+        samples: So many numbers in a row are of one scenario, whose samples are units apart.
     """
     ends = np.sort([votes.first, votes.second], axis=0)
     # Equal columns (expert, scenario, low, high) are one expert's judgements of one unit.
@@ -87,6 +88,7 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         return Agreement(
             alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
         )
+    scenario //= samples
     scenarios, cluster = np.unique(scenario, return_inverse=True)
     # (U, 9 + 6): every coefficient is a function of sums over units, which rounds weigh anew.
     by_unit = np.hstack([_coincidences(table), _shares(table)])

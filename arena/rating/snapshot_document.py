@@ -156,7 +156,7 @@ class Trust:
     """Statistics about the votes themselves.
 
     Attributes:
-        tie_share: From 0 to 1.
+        tie_share: From 0 to 1, of the votes that were cast; earlier ratings counted settled ties.
         strength: None where no vote has one.
         fragility: Votes on which the first place hangs; None where none change it.
     """

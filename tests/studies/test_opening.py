@@ -12,12 +12,13 @@ from django.utils import timezone
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
+from arena.results.exports.preferences import preference_sheet
 from arena.results.queries.votes import Filters, last_vote_id, vote_set
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from arena.studies.services.planning import frozen_pictures, frozen_rules
 from arena.studies.services.taking_part import hand_over
-from arena.voting.services.pictures import draw_sample
+from arena.voting.services.pictures import SampleRule, draw_sample
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
@@ -25,7 +26,18 @@ from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_checks
 from tests.opening import open_study
 from tests.scenes import vehicle
-from tests.study_rows import KINDS, Cast, cast_of, contestant, expert, picture, scenario, vote
+from tests.study_rows import (
+    KINDS,
+    Cast,
+    cast_of,
+    contestant,
+    expert,
+    picture,
+    scenario,
+    vote,
+    vote_all,
+    write_changes,
+)
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -278,6 +290,26 @@ def test_one_sample_of_each_scenario_is_drawn_by_the_seed() -> None:
     sampled()
     found = shown(opened_of())
     assert found == {(f"place-{n}", DRAWN[n] + 1, DRAWN[n] + 1) for n in range(6)}
+
+
+def test_samples_are_pictures_of_their_own_in_all_that_is_counted() -> None:
+    sampled(samples=2, places=2)
+    write_changes()
+    for number in range(2):
+        same = Augmentation.objects.filter(scenario__slug=f"place-{number}", sample=1)
+        same.exclude(contestant__slug="cid").update(image=f"bev/{number:032}.png")
+    study = opened_of(votes=10, places=2, samples=SampleRule.ALL)
+    study.rules["alike_shown"] = [["place-0#2", "ann", "bob"]]
+    study.save()
+    study = vote_all(study)
+    results = rate(study=study, rounds=10).results
+    assert results.trust.agreement
+    assert (results.trust.agreement.units, results.trust.tie_share) == (10, 0.0)
+    assert "Of 2 votes on 1 such pairs" in " ".join(results.board.warnings)
+    columns = [*(sheet := preference_sheet(study)).columns]
+    rows = [dict(zip(columns, row, strict=True)) for row in sheet.rows]
+    named = {str(row[f"augmentation_{side}"]) for row in rows if row["settled"] for side in "ab"}
+    assert [row.sample for row in Augmentation.objects.filter(code__in=named)] == [1] * 4
 
 
 def test_options_are_not_mixed_under_one_contestant() -> None:

@@ -16,15 +16,16 @@ from django.template.loader import get_template
 from arena.exports.formats import formats, json_bytes
 from arena.exports.latex import escape
 from arena.models import Question, Snapshot
-from arena.pairing.order import MAIN
+from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.rating.comparisons import Estimate
-from arena.rating.lines import count_text, votes_text
+from arena.rating.lines import count_text, unshown_text, votes_text
 from arena.rating.rules import Unit
 from arena.rating.snapshot_document import Trust
 from arena.results.exports.tables import method_text
 from arena.results.queries.votes import REASONS, Filters, select_counted_votes
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict
+from augment.services.scenarios import type_label
 
 BLANK = "[BLANK]"
 """What authors have to fill in."""
@@ -69,11 +70,12 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "outputs": [str(count) for count in sorted({min(counts), max(counts)})],
         "plan": _tell_plan(snapshot, frozen),
         "product": frozen["product"]["version"],
-        "quality": _tell_quality(frozen["rules"]),
+        "quality": _tell_quality(snapshot),
         "key": key,
         "criterion": CRITERIA.get(Question(key), {}),
         "question": str(Question(key).label),
-        "method": method_text(snapshot),
+        "method": method_text(snapshot)
+        + ", an early look: the study was still open" * snapshot.is_early,
         "votes": votes_text(snapshot.votes_cast, snapshot.settled_ties),
         "left_out": ", ".join(f"{number} {REASONS[why]}" for why, number in left_out) or "none",
         "agreement": _tell_agreement(snapshot.results.trust),
@@ -97,6 +99,7 @@ def methods_json(methods: dict[str, Any]) -> bytes:
         "study": methods["study"].name,
         "rating": str(methods["snapshot"].code),
         "simulated": methods["simulated"],
+        "early": methods["snapshot"].is_early,
     }
     blank = [line["number"] for line in questions if line["answer"] is None]
     versions = dict(sorted(methods["snapshot"].versions.items()))  # PostgreSQL has its own order
@@ -137,26 +140,26 @@ def _tell_plan(snapshot: Snapshot, frozen: dict[str, Any]) -> str:
         plan += f", every pair with {' or '.join(challengers)}"
     if later := snapshot.study.matchups.filter(batch__gt=0, kind=MAIN).count():
         plan += f"; {later} more were planned later, for who came by a link or took over"
-    settled = len(frozen["rules"].get("identical", ()))
-    if not settled:
-        return plan
-    is_left_out = Filters.of_document(snapshot.filters).leave_out_settled
-    counted = (
-        "are left out" if is_left_out else "count as ties, each as often as others on average"
-    )
-    return f"{plan}; {settled} pairs that nobody can tell apart were not shown and {counted}"
+    filters = Filters.of_document(snapshot.filters)
+    if settled := len(frozen["rules"].get("identical", ())):
+        ties = "" if filters.leave_out_settled else "ties, each as often as others on average"
+        plan += f"; {unshown_text(settled, ties)}"
+    if filters.types:
+        plan += f"; rated are only these types: {', '.join(map(type_label, filters.types))}"
+    if filters.experts:
+        plan += f"; rated are only votes of {count_text(len(filters.experts), 'chosen expert|')}"
+    return plan
 
 
-def _tell_quality(rules: dict[str, Any]) -> str:
-    shares = {"hidden repeats": "repeat_share", "attention checks": "check_share"}
-    used = [
-        f"{100.0 * rules[share]:.0f} % {name}"
-        for name, share in shares.items()
-        if rules.get(share)
-    ]
+def _tell_quality(snapshot: Snapshot) -> str:
+    numbers = Counter(snapshot.study.matchups.values_list("kind", flat=True))
+    kinds = {REPEAT: "hidden repeat|", CHECK: "attention check|"}
+    used = [count_text(numbers[kind], name) for kind, name in kinds.items() if numbers[kind]]
     if not used:
         return "There were no hidden repeats or attention checks"
-    return f"On top came {' and '.join(used)}; they are not rated, and no vote is removed by them"
+    rated = numbers[REPEAT] and REPEAT in Filters.of_document(snapshot.filters).kinds
+    how = "the repeats are rated as well" if rated else "they are not rated"
+    return f"On top came {' and '.join(used)}; {how}, and no vote is removed by them"
 
 
 def _tell_tests(snapshot: Snapshot) -> str:
@@ -168,25 +171,20 @@ def _tell_tests(snapshot: Snapshot) -> str:
         elif snapshot.resampling_unit == Unit.TWO_WAY:
             why = "the votes bound no rating"
         return f"Differences of pairs are not tested: {why}"
-    number = len(board.above)
-    if board.p_values is None:
-        tested = "All pairs are tested at once"
-    elif len(board.p_values) == 1:
-        tested = "The one pair is tested"
-    else:
-        tested = f"All {len(board.p_values)} pairs are tested at once"
+    number, pairs = len(board.above), len(board.p_values or ())
+    all_are = f"All {pairs} pairs are" if pairs else "All pairs are"
+    tested = "The one pair is tested" if pairs == 1 else f"{all_are} tested at once"
     return f"{tested}, at an error of 5 % for the table; {number} differ{'s' * (number == 1)}"
 
 
 def _tell_agreement(trust: Trust) -> str:
     parts = []
     if trust.agreement and trust.agreement.units:
-        alpha, units = _text(trust.agreement.alpha), trust.agreement.units
-        on = count_text(units, "pair| that several experts judged")
-        parts.append(f"Krippendorff's alpha (nominal) is {alpha} on {on}")
+        on = count_text(trust.agreement.units, "pair| that several experts judged")
+        parts.append(f"Krippendorff's alpha (nominal) is {_text(trust.agreement.alpha)} on {on}")
     if trust.repeats is not None:
-        number, same = trust.repeats.number, _text(trust.repeats.same)
-        parts.append(f"Of {number} hidden repeats a share of {same} was answered alike")
+        of = count_text(trust.repeats.number, "hidden repeat|")
+        parts.append(f"Of {of} a share of {_text(trust.repeats.same)} was answered alike")
     return ". ".join(parts) or "Agreement was not measured: no pair was judged twice"
 
 

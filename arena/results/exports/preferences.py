@@ -98,7 +98,8 @@ def _list_rows(study: Study, question: str) -> Iterator[dict[str, Any]]:
     shown = Augmentation.objects.filter(pk__in=list_shown_ids(study)).select_related("contestant")
     # By code what was shown, and by contestant for ties on pairs that nobody was.
     made = {str(row.code): row for row in shown}
-    made |= {f"{row.scenario_id} {row.contestant.slug}": row for row in shown}
+    each = study.shows_all_samples
+    made |= {f"{row.scenario_id} {row.sample * each} {row.contestant.slug}": row for row in shown}
     texts = {key: _json(row.modification) for key, row in made.items()}
     places: dict[str, tuple[int, dict[str, Any]]] = {}
     for row in study.scenarios.select_related("base_scene"):
@@ -119,7 +120,7 @@ def _list_rows(study: Study, question: str) -> Iterator[dict[str, Any]]:
             ("a", vote.left, vote.left_code),
             ("b", vote.right, vote.right_code),
         ):
-            key = code or f"{scenario} {slug}"
+            key = code or f"{scenario} {vote.sample} {slug}"
             line[f"contestant_{side}"] = slug
             line[f"augmentation_{side}"] = str(made[key].code) if key in made else None
             line[f"modification_{side}"] = texts.get(key)

@@ -60,12 +60,12 @@ def fill_table(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     both_miss = sum(pair.both_miss for pair in snapshot.results.pairs)
     settled = count_settled(snapshot)
     cast = max(snapshot.votes_counted - settled, 1)
-    ties = round((trust.tie_share or 0.0) * snapshot.votes_counted)
+    ties = sum(pair.ties for pair in snapshot.results.pairs)
     return plot(table.rows) | {
         "largest_move": max(moves, default=None),
         "ties": ties,
-        "tie_share": (ties - settled) / cast if settled else trust.tie_share,
-        "all_tied": trust.tie_share == 1.0,
+        "tie_share": (ties - settled) / cast,
+        "all_tied": ties == snapshot.votes_counted,
         "both_miss": both_miss,
         "both_miss_share": both_miss / cast,
         "weighed_order": [names[slug] for slug in order],

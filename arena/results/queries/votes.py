@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 
 from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.rules import Entry, draw_ties, make_grid, scenario_at
+from arena.pairing.rules import Entry, draw_ties, make_grid, sample_at, scenario_at
 from arena.voting.queries.blinding import is_imported
 from augment.errors import check_names
 from augment.models import Contestant
@@ -89,6 +89,7 @@ class RatedVote(NamedTuple):
         strength: slightly or clearly better.
         question: What was asked.
         faults: What was marked as wrong, as a Vote keeps it.
+        sample: Of the item, where each one is judged on its own, else 0.
     """
 
     judge: str
@@ -114,6 +115,7 @@ class RatedVote(NamedTuple):
     strength: str = ""
     question: str = Question.INSTRUCTION.value
     faults: Sequence[Sequence[str]] = ()
+    sample: int = 0
 
     @property
     def winner(self) -> str | None:
@@ -152,7 +154,7 @@ class Filters:
 
     def as_document(self) -> dict[str, Any]:
         """As a snapshot keeps it."""
-        document: dict[str, Any] = _FILTERS.dump_python(self, mode="json", warnings=False)
+        document: dict[str, Any] = _FILTERS.dump_python(self, mode="json")
         return document | {"authors": [list(pair) for pair in sorted(self.authors)]}
 
     @staticmethod
@@ -196,8 +198,7 @@ def last_vote_id(study: Study) -> int | None:
         if is_imported(study)
         else Vote.objects.filter(matchup__study=study)
     )
-    last: int | None = votes.aggregate(last=Max("pk"))["last"]
-    return last
+    return cast("int | None", votes.aggregate(last=Max("pk"))["last"])
 
 
 def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
@@ -213,8 +214,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     _check_names(study, filters, votes)
     left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
     if not is_imported(study):
-        everything = _votes_asked(study, filters, last).count()
-        left_out[LeftOut.SUPERSEDED.value] = everything - counted
+        left_out[LeftOut.SUPERSEDED.value] = _votes_asked(study, filters, last).count() - counted
     primary = votes
     if find_question(study, filters) != study.questions[0]:
         primary = current_votes(study, replace(filters, question=""), last)
@@ -264,6 +264,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Rate
         *("outcome", "both_miss", "is_simulated", F("mark"), "ms_visible"),
         *("matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment"),
         *("shown_left__code", "shown_right__code", "strength", "question", "faults"),
+        F("shown_right__sample") if study.shows_all_samples else Value(0),
     )
     current = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk")
     return [
@@ -320,6 +321,7 @@ def list_ties_unshown(
             both_miss=False,
             is_simulated=first.is_simulated,
             question=find_question(study, filters),
+            sample=sample_at(place),
         )
         is_asked_for = (
             MAIN in filters.kinds
@@ -353,12 +355,10 @@ def mark_imported_votes(
     study: Study, filters: Filters, last: int | None
 ) -> QuerySet[ImportedVote]:
     """The votes of a study's file up to a row, each with its `mark`."""
-    is_other = Q()
+    no_other = Q(judge__in=filters.experts) if filters.experts else Q(pk__isnull=False)
     if filters.types or MAIN not in filters.kinds:
-        is_other = Q(pk__isnull=False)
-    elif filters.experts:
-        is_other = ~Q(judge__in=filters.experts)
-    reasons = [(LeftOut.FILTERED, is_other)] if is_other else []
+        no_other = Q(pk__isnull=True)
+    reasons = [(LeftOut.FILTERED, ~no_other)]
     return _with_mark(ImportedVote.objects.filter(file__study=study, pk__lte=last or 0), reasons)
 
 

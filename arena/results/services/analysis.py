@@ -83,10 +83,7 @@ def vote_arrays(competitors: Sequence[Contestant], votes: Sequence[RatedVote]) -
         comparisons=comparisons,
         judges=tuple(judges),
         items=tuple(items),
-        ms=np.array(
-            [np.nan if vote.ms_visible is None else vote.ms_visible for vote in votes],
-            dtype=np.float64,
-        ),
+        ms=np.array([vote.ms_visible for vote in votes], dtype=np.float64),
     )
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
-from arena.pairing.rules import scenario_at
+from arena.pairing.rules import sample_at, scenario_at
 from arena.rating import influence
 from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_votes, tally
 from arena.rating.leaderboard import Leaderboard
-from arena.rating.lines import count_text, whole_percent
+from arena.rating.lines import count_text, unshown_text, whole_percent
 from arena.rating.models import to_elo
 from arena.rating.reliability import (
     Evidence,
@@ -40,6 +40,9 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
     """
     rated = np.flatnonzero(tally(arrays.comparisons).sum(axis=1)).tolist()
     inner = restrict_to(arrays.comparisons, rated)
+    samples = np.array([vote.sample for vote in votes.counted], dtype=np.int64)
+    each = int(samples.max(initial=0)) + 1  # whose pictures are judged apart
+    inner = replace(inner, scenario=inner.scenario * each + samples)
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
     repeats = _repeats(arrays, votes)
@@ -47,8 +50,8 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
     by_hand = np.flatnonzero(is_cast)
     by_people = select_votes(inner, by_hand)
     return Trust(
-        tie_share=float((inner.score == 0.5).mean()) if len(inner) else None,
-        agreement=agreement(by_people, rounds=AGREEMENT_ROUNDS, seed=seed),
+        tie_share=float((by_people.score == 0.5).mean()) if len(by_people) else None,
+        agreement=agreement(by_people, rounds=AGREEMENT_ROUNDS, seed=seed, samples=each),
         side=side_bias(by_people) if len(by_people) else None,
         repeats=repeats if repeats.number else None,
         raters=_panel(arrays, inner, by_hand, votes, repeats),
@@ -93,27 +96,24 @@ def remark_on_ties(study: Study, votes: VoteSet, *, left_out: bool) -> str:
     if not settled:
         return ""
     ties = sum(vote.kind == AUTOMATIC for vote in votes.counted)
-    sentence = (
-        f"The table says how contestants compare where their pictures differ: {settled} pairs "
-        "that nobody can tell apart were not shown and are left out."
-        if left_out
-        else f"The table says how contestants compare over all pairs of pictures: {settled} "
-        "pairs that nobody can tell apart were not shown and count as "
-        f"{count_text(ties, 'tie|')}, as many a pair as others have votes on average."
-    )
+    where = "where their pictures differ" if left_out else "over all pairs of pictures"
+    counted = f"{count_text(ties, 'tie|')}, as many a pair as others have votes on average"
+    unshown = unshown_text(settled, "" if left_out else counted)
+    sentence = f"The table says how contestants compare {where}: {unshown}."
     return f"{sentence} {_on_those_shown(study, votes)}".strip()
 
 
 def _on_those_shown(study: Study, votes: VoteSet) -> str:
     """The tie share of alike pairs that experts were shown all the same."""
     shown = {
-        (scenario_at(place), frozenset((first, other)))
+        (scenario_at(place), sample_at(place), frozenset((first, other)))
         for place, first, other in study.rules.get("alike_shown", ())
     }
     votes_shown = [
         vote.outcome == Vote.Outcome.EQUAL
         for vote in votes.counted
-        if vote.kind == MAIN and (vote.item, frozenset((vote.left, vote.right))) in shown
+        if vote.kind == MAIN
+        and (vote.item, vote.sample, frozenset((vote.left, vote.right))) in shown
     ]
     if not votes_shown:
         return ""
@@ -130,11 +130,9 @@ def _check_strength(inner: Comparisons, votes: VoteSet) -> StrengthCheck | None:
     strengths = [vote.strength for vote in votes.counted]
     if not any(strengths):
         return None
-    check = StrengthCheck(
-        slight=strengths.count(Vote.Strength.SLIGHTLY.value),
-        clear=strengths.count(Vote.Strength.CLEARLY.value),
-    )
-    is_slight = np.array(strengths) == Vote.Strength.SLIGHTLY.value
+    slightly, clearly = Vote.Strength.SLIGHTLY.value, Vote.Strength.CLEARLY.value
+    check = StrengthCheck(slight=strengths.count(slightly), clear=strengths.count(clearly))
+    is_slight = np.array(strengths) == slightly
     plain, weighed = influence.bradley_terry(inner), influence.bradley_terry(inner, is_slight)
     if plain is None or weighed is None:
         return check
