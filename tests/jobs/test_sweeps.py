@@ -189,6 +189,18 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_now(now:
     assert LoadedScenario(ended(sweep, at_2=0.4).hardest).intent is None
 
 
+def test_it_is_said_that_workers_do_not_drive_the_planner_of_a_command(settings: Settings) -> None:
+    """A sweep by a command that was interrupted waits for ever unless somebody allows it."""
+    sweep = planned(count=2)
+    assert "ARENA_PLANNERS" not in sweep_result(sweep).verdict
+    settings.PLANNERS = ()
+    assert sweep_result(sweep).verdict.endswith(
+        f"Workers drive {STRAIGHT.planner} only if ARENA_PLANNERS names it."
+    )
+    Simulation.objects.update(state=State.FAILED)
+    assert "ARENA_PLANNERS" not in sweep_result(sweep).verdict
+
+
 def test_a_sweep_that_can_not_be_is_refused() -> None:
     scenario = add_parked()
     for changed, error, words in (

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 from django.core.management import CommandError, call_command
 
-from arena.management.commands.demo import add_model, finish, launch_model
+from arena.management.commands.demo import add_model, finish, launch_model, wait_for
 from augment.errors import AugmentError
 from augment.fake_llm.server import running
 from augment.models import Contestant, Endpoint, ModelCall
@@ -85,3 +85,9 @@ def test_a_model_of_ones_own_runs_within_its_cap(
     assert sees or lines[-1].endswith("of what failed: too long")
     states = set(job.augmentations.values_list("state", flat=True))
     assert states == {"done", "cancelled" if sees else "failed"}
+
+
+def test_what_workers_do_is_waited_for_while_it_gets_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("arena.management.commands.demo.STUCK_S", 0.0)
+    for left, ends_with in (([3, 2, 0], 0), ([3, 3, 3, 0], 3)):
+        assert wait_for(iter(left).__next__, lambda: None) == ends_with

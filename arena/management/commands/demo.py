@@ -45,7 +45,7 @@ from augment.services.endpoints import (
     paper_variants,
 )
 from augment.services.endpoints.contestants import REFERENCE
-from augment.services.judging import pairs_apart
+from augment.services.judging import count_unmeasured, pairs_apart
 from augment.services.running import JobRequest, count_rows
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import cancel, launch, retry_failed
@@ -136,6 +136,7 @@ class Command(TerminalCommand):
                 if study.state == Study.State.OPEN:
                     took_s = time.monotonic() - started
                     say(f"“{study.name}” is open for votes after {took_s:.0f} s.")
+                wait_for(partial(count_unmeasured, jobs[0]), look)  # which a worker measures
                 text, files = vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
                 send_charts(Snapshot.objects.latest("made_at").pk)
                 drives = start_drives()
@@ -143,7 +144,9 @@ class Command(TerminalCommand):
                 if drives:
                     say(f"{len(drives)} drives follow in the background.")
                 if not serve:
-                    finish_drives(drives, look)
+                    waiting = {"pk__in": drives, "state__in": models.Simulation.UNDER_WAY}
+                    if left := wait_for(models.Simulation.objects.filter(**waiting).count, look):
+                        raise DemoFailed(f"{left} of {len(drives)} drives are not over.")
                 self._show(web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch(stack.missing_stand_ins)
@@ -318,23 +321,17 @@ def start_drives() -> list[int]:
     return waiting
 
 
-def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
-    """Wait until they are over.
-
-    Raises:
-        DemoFailed: None ends for STUCK_S.
-    """
-    before, give_up_at = len(drives) + 1, 0.0
-    under_way = models.Simulation.objects.filter(
-        pk__in=drives, state__in=models.Simulation.UNDER_WAY
-    )
-    while left := under_way.count():
+def wait_for(count: Callable[[], int], look: Callable[[], None]) -> int:
+    """Wait until nothing is left, or no less for STUCK_S; returns how much is."""
+    before, give_up_at = math.inf, 0.0
+    while left := count():
         look()
         if left < before:
             before, give_up_at = left, time.monotonic() + STUCK_S
         elif time.monotonic() > give_up_at:
-            raise DemoFailed(f"{left} of {len(drives)} drives are not over.")
-        time.sleep(0.2)
+            break
+        time.sleep(0.5)
+    return left
 
 
 def open_for_votes(scenarios: list[str], own: OwnModel | None = None) -> Study:

@@ -22,7 +22,7 @@ from augment.models import Scenario, Sweep
 from augment.services import read_request, to_inputs
 from augment.services.driving import driver_name, list_allowed_planners, sweep_result, sweeps
 
-KEPT = ("number", "low", "high", "count", "planner", "offsets")
+KEPT = ("number", "low", "high", "count", "planner", "offsets", "is_reactive")
 """What the form of a new sweep is filled in with by an address."""
 
 

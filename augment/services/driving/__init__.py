@@ -18,12 +18,11 @@ from augment.services.driving.planner_table import (
     compare_job,
     ways_to_compare,
 )
-from augment.services.driving.simulations import (
-    NUPLAN,
-    blind_drive,
-    drive_file,
-    list_allowed_planners,
-    plan_scenario,
-)
+from augment.services.driving.simulations import NUPLAN, blind_drive, drive_file, plan_scenario
 from augment.services.driving.sweeps import LARGEST_FAMILY, SweepRequest, add_family, plan_sweep
-from augment.services.driving.thresholds import SweepResult, driver_name, sweep_result
+from augment.services.driving.thresholds import (
+    SweepResult,
+    driver_name,
+    list_allowed_planners,
+    sweep_result,
+)

@@ -17,12 +17,12 @@ from augment.scene.codec import modification_from_document
 from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
-from augment.services.driving.thresholds import conclude, conclude_all
+from augment.services.driving.thresholds import conclude, conclude_all, list_allowed_planners
 from augment.services.scenarios.choosing import find_type
 from augment.services.scenarios.scenes import LoadedScenario
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
-from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
+from augment.simulation.planners import PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.trace import blind_trace, make_trace
@@ -52,11 +52,6 @@ class Options:
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Return the drives with these options."""
         return rows.filter(**asdict(self))
-
-
-def list_allowed_planners() -> tuple[str, ...]:
-    """Return the planners that workers of this installation may load."""
-    return (*NAMED, *settings.PLANNERS)
 
 
 def load_planner(how: Options | Simulation, *, also: Collection[str] = ()) -> Planner:

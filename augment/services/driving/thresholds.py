@@ -7,6 +7,7 @@ the hardest value as a scenario, and a worker's regular round does where that on
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from django.conf import settings
 from django.db import transaction
 from django.utils import timezone
 
@@ -19,6 +20,7 @@ from augment.scene.intent import Intent
 from augment.scene.intent_statements import list_statements
 from augment.scene.numbers import list_numbers, set_number
 from augment.services.scenarios.scenes import LoadedScenario, add_variant, scenario_seed
+from augment.simulation.planners import NAMED
 from augment.simulation.score import ScoreKind
 from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
 
@@ -73,14 +75,21 @@ class SweepResult:
 
     @property
     def verdict(self) -> str:
-        """Threshold of the planner under test, as a sentence."""
-        passed = {line.is_passed for line in self.lines} - {None}
+        """Threshold of the planner under test, and what keeps it from driving on, in sentences."""
+        passed, planner = {line.is_passed for line in self.lines} - {None}, self.sweep.planner
+        is_kept = bool(self.under_way) and planner not in list_allowed_planners()
+        note = f" Workers drive {planner} only if ARENA_PLANNERS names it." * is_kept
         if self.edges:
             places = "; ".join(f"it passes {good:g} and fails {bad:g}" for good, bad in self.edges)
-            return f"Where the planner fails: {places}."
+            return f"Where the planner fails: {places}.{note}"
         if not passed:
-            return "The planner has driven no value to its end."
-        return f"The planner {'passes' if True in passed else 'fails'} every value driven."
+            return f"The planner has driven no value to its end.{note}"
+        return f"The planner {'passes' if True in passed else 'fails'} every value driven.{note}"
+
+
+def list_allowed_planners() -> tuple[str, ...]:
+    """Return the planners that workers of this installation may load."""
+    return (*NAMED, *settings.PLANNERS)
 
 
 def sweep_result(sweep: Sweep) -> SweepResult:
