@@ -133,8 +133,9 @@ def read_environment() -> Environment:
     try:
         read = Environment.model_validate({n: text for n, text in texts.items() if text})
     except ValidationError as error:
+        shown = {name: re.sub("//.*@", "//***@", text) for name, text in texts.items()}
         lines = [
-            f"{fault['loc'][0]}={texts[str(fault['loc'][0])]!r} can't be used: "
+            f"{fault['loc'][0]}={shown[str(fault['loc'][0])]!r} can't be used: "
             f"{fault['msg'].removeprefix('Value error, ')}."
             for fault in error.errors()
         ]

@@ -45,8 +45,17 @@ def test_planners_of_a_job_stand_in_one_table() -> None:
     assert found["Unmodified scene", "idm", ""]["sets"] == "a"
     tex = exported("--planners", *scores, "--format", "latex")
     assert r"50.0 [17.9, 82.1] b" in tex
-    page = signed_in(people()["researcher"]).get(reverse("job-tab", args=[job.code, "driving"]))
+    researcher = signed_in(people()["researcher"])
+    page = researcher.get(reverse("job-tab", args=[job.code, "driving"]))
     assert "Planners beside each other" in page.content.decode()
+
+
+def test_a_table_of_planners_that_are_not_there_is_refused_in_a_sentence() -> None:
+    job = finished(rows.launch())
+    driven(job)
+    table = reverse("job-export", args=[job.code, "planners-nuplan", "csv"])
+    page = signed_in(people()["researcher"]).get(table, follow=True)
+    assert "was not driven by two planners" in page.content.decode()
 
 
 def test_who_is_better_on_the_same_drives_comes_first_where_some_are_missing() -> None:

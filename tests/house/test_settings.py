@@ -68,6 +68,21 @@ def test_a_wrong_value_is_named_with_what_is_allowed(
     assert allowed in str(refused.value).splitlines()[-1]
 
 
+def test_a_wrong_value_is_named_without_its_password(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (
+        ("REDIS_URL", "redis://:{}@localhost:99999/0"),
+        ("DATABASE_URL", "mysql://root:{}@localhost/arena"),
+        ("ARENA_LLM_PROXY", "http://me:{}@proxy:80"),
+    ):
+        monkeypatch.setenv(name, value.format("s3@cr:t"))
+        with pytest.raises(ImproperlyConfigured, match=name) as refused:
+            read_environment()
+        assert "***@" in str(refused.value)
+        assert "s3" not in str(refused.value)
+        assert "cr" not in str(refused.value)
+        monkeypatch.delenv(name)
+
+
 @pytest.mark.parametrize("place", [ROOT, ROOT / "manage.py" / "below"])
 def test_a_wrong_value_stops_the_start(place: Path) -> None:
     finished = start(DATABASE_URL=f"sqlite:///{place}")

@@ -72,12 +72,9 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     ways, way = _ways(request, job)
     drives = Simulation.objects.filter(driving_scores.drives_of_job(job)).defer("trace")
-    rows = ways[way].of(drives)
-    related = rows.select_related("scenario", "augmentation__contestant")
-    ordered = related.order_by(
-        "scenario__type", "scenario__slug", "augmentation__contestant__name"
-    )
-    page = read_page(request, ordered, size=DRIVES_AT_ONCE)
+    rows = ways[way].of(drives).select_related("scenario", "augmentation__contestant")
+    order = "scenario__type", "scenario__slug", "augmentation__contestant__name"
+    page = read_page(request, rows.order_by(*order), size=DRIVES_AT_ONCE)
     lines = [(row, driving_scores.least_clearance_m(row)) for row in page.object_list]
     return render(request, "drives/list.html", {"job": job, "page": page, "lines": lines})
 
@@ -102,9 +99,8 @@ def drive_trace(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     row = _driven(code)
     if row.state != Simulation.State.DONE:
         raise Http404
-    answer = HttpResponse(drive_file(row), content_type="application/json")
-    answer["Cache-Control"] = "private, max-age=3600"
-    return answer
+    headers = {"Cache-Control": "private, max-age=3600"}
+    return HttpResponse(drive_file(row), content_type="application/json", headers=headers)
 
 
 def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
@@ -144,10 +140,8 @@ def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]
 
 
 def _driven(code: uuid.UUID) -> Simulation:
-    rows = Simulation.objects.select_related(
-        "scenario", "augmentation__contestant", "swept__sweep"
-    )
-    return get_object_or_404(rows, code=code)
+    related = "scenario", "augmentation__contestant", "swept__sweep"
+    return get_object_or_404(Simulation.objects.select_related(*related), code=code)
 
 
 def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
@@ -183,7 +177,9 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
         ways, way = _ways(request, job)
         options = {"options": ways[way]}
     stem = f"{slugify(job.name) or 'job'}-{name}"
-    return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
+    with refusals_told(request):  # planners of which only one drove, for example
+        return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
+    return redirect("job-tab", code=code, tab="driving")
 
 
 @page_for(*STAFF)

@@ -99,8 +99,7 @@ class Command(TerminalCommand):
 
     def _say(self, pk: int, place: str) -> None:
         row = Simulation.objects.select_related("scenario", "augmentation__contestant").get(pk=pk)
-        subject = row.get_subject_display()
-        who = subject if row.augmentation is None else row.augmentation.contestant.name
+        who = row.augmentation.contestant.name if row.augmentation else row.get_subject_display()
         result = row.reason or "driven by a worker"
         if row.state == Simulation.State.DONE:
             nuplan, interplan = (100.0 * (getattr(row, name) or 0.0) for name in SCORES.values())
