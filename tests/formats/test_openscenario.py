@@ -169,9 +169,16 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
 @pytest.mark.parametrize(
     ("made", "note"),
     [
-        (scenario(event("<ControllerAction/>")), "ControllerAction was left out, first in event"),
+        (scenario(event("<ControllerAction/>"), event("<ControllerAction/>", name="more")),
+         "left out: ControllerAction (2); first event acts."),
+        (scenario(event(BRAKES, by_entity(GAP.format(20, "false").replace(
+            "<RelativeD", '<D').replace(" entity", ' alongRoute="true" entity')))),
+         "A distance along roads is taken as the one between places"),
+        (scenario(other_does=(RELATIVE.format(-2, "delta").replace(
+            "Speed entity", 'Speed continuous="1" entity'),)),
+         "A speed that is kept relative to somebody is taken once"),
         (scenario(event("<RoutingAction><AcquirePositionAction/></RoutingAction>")),
-         "AcquirePositionAction was left out"),
+         "left out: AcquirePositionAction (1); first event acts."),
         (scenario(event("<RoutingAction><AssignRouteAction/></RoutingAction>")),
          "needs a Route of two waypoints"),
         (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>', "Ego"))),
@@ -283,16 +290,39 @@ def test_the_ego_is_who_is_asked_for(tmp_path: Path) -> None:
         read(file, "Nobody")
 
 
-@pytest.mark.parametrize("state", ["red", "on;off;off"])
-def test_a_light_shows_what_its_controller_or_action_says(state: str, tmp_path: Path) -> None:
-    action = (
-        "<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction "
-        f'name="7" state="{state}"/></TrafficSignalAction></InfrastructureAction></GlobalAction>'
+PHASES = "".join(
+    f'<Phase name="{state}"><TrafficSignalState trafficSignalId="7" state="{state}"/></Phase>'
+    for state in ("green", "red")
+)
+
+
+@pytest.mark.parametrize(
+    ("action", "controller", "light", "note"),
+    [
+        ('StateAction name="7" state="red"', "", TrafficLight.RED, ""),
+        ('StateAction name="7" state="on;off;off"', "", TrafficLight.RED, ""),
+        ("", "", TrafficLight.GREEN, ""),
+        ('ControllerAction trafficSignalControllerRef="c" phase="red"', "", TrafficLight.RED, ""),
+        ('ControllerAction trafficSignalControllerRef="c" phase="x"', "", TrafficLight.UNKNOWN,
+         "controller: unknown 'x'; known: green, red"),
+        ("", 'delay="5" reference="d"', TrafficLight.UNKNOWN, "controller: c begins later"),
+    ],
+)  # fmt: skip
+def test_a_light_shows_what_its_controller_or_action_says(
+    action: str, controller: str, light: TrafficLight, note: str, tmp_path: Path
+) -> None:
+    wraps = "<GlobalAction><InfrastructureAction><TrafficSignalAction>"
+    said = f"{wraps}<TrafficSignal{action}/></TrafficSignalAction></InfrastructureAction>"
+    text = scenario(more=f"{said}</GlobalAction>" if action else "").replace(
+        "</RoadNetwork>",
+        f'<TrafficSignals><TrafficSignalController name="c" {controller}>{PHASES}'
+        "</TrafficSignalController></TrafficSignals></RoadNetwork>",
     )
     roads = {"roads.xodr": by_hand(end=SIGNAL, rest=JUNCTION)}
-    reading = read(write(tmp_path, scenario(more=action), **roads))
+    reading = read(write(tmp_path, text, **roads))
     lights = {way.traffic_light for way in reading.scene.connectors}
-    assert lights == {TrafficLight.RED, TrafficLight.NONE}
+    assert lights == {light, TrafficLight.NONE}
+    assert any(note in text for text in reading.notes)
 
 
 # There and back

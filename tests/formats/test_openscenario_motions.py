@@ -15,6 +15,7 @@ from tests.formats.openscenario_files import (
     CHANGE,
     GAP,
     OF_EGO,
+    OTHER_AT,
     RIGHT,
     ROADS,
     STEP,
@@ -48,6 +49,20 @@ def test_an_empty_trigger_never_fires(owner: str, conditions: str, tmp_path: Pat
     assert f"An {owner} whose StartTrigger is empty never begins." in reading.notes
     (other,) = moves(read(write(tmp_path, text.replace(trigger, "")))).others
     assert other.states[-1, 3] < 10.0
+
+
+@pytest.mark.parametrize("times", ["<None/>", TIMING.format("absolute")])
+@pytest.mark.parametrize("who", [None, "Other"])
+def test_who_is_put_nowhere_begins_on_its_trajectory(
+    who: str | None, times: str, tmp_path: Path
+) -> None:
+    text = scenario(other_does=(follow(vertices((0, 80), (3, 110)), times),))
+    teleport = f"<PrivateAction><TeleportAction><Position>{OTHER_AT}"
+    text = text.replace(f"{teleport}</Position></TeleportAction></PrivateAction>", "")
+    scene = read(write(tmp_path, text), who).scene
+    other = scene.ego if who else scene.agents[0]
+    assert scene.origin.x_m + (0.0 if who else other.x_m) == pytest.approx(81.4)
+    assert other.speed_mps == (0.0 if "None" in times else pytest.approx(10.0))
 
 
 @pytest.mark.parametrize("way", ["2", "4"])

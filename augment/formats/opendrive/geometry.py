@@ -31,6 +31,7 @@ _CURVATURES = {
     **dict.fromkeys(("poly3", "paramPoly3"), ()),
 }
 """The attributes that name a piece's curvatures, by its kind."""
+_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 
 
 def read_float(
@@ -44,6 +45,11 @@ def read_float(
 ) -> float:
     """Return an attribute that is a number; raises InvalidDocument as `foreign.read_number`."""
     return foreign.read_number(element.get(name, default), f"{place}.{name}", least, most)
+
+
+def read_switch(element: Element, name: str, place: str) -> bool:
+    """Return an attribute that is a boolean, False without it."""
+    return foreign.look_up(_SWITCH, element.get(name, "false").lower(), f"{place}.{name}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.opendrive.geometry import read_float
+from augment.formats.opendrive.geometry import read_float, read_switch
 from augment.formats.openscenario.events import BEGUN, ENDED, WAIT, Groups, StoryEvent, has_begun
 from augment.formats.openscenario.trajectories import place_beside
 from augment.geometry.frames import Pose
@@ -32,7 +32,6 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = 
     "carla:latched": lambda now, before, begun: np.maximum.accumulate(now & begun),
 }
 _STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
-_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _USUAL = {
     "ReachPositionCondition": ("tolerance", "lessOrEqual"),
     "StandStillCondition": ("duration", "greaterOrEqual"),
@@ -114,8 +113,6 @@ def find_trigger(
         return AtTime(after_s=time_s), min(step, len(expected.times_s) - 1)
     step, watched = find_step(event, expected)
     tried = [element for condition in event.conditions for element in condition.iter()]
-    along = [e for e in tried if e.get("coordinateSystem", "entity") != "entity"]
-    doubts.assume("A distance along roads is taken as the one between places", len(along))
     goals = [e for e in tried if e.tag == "Position" and not _list_refs(e)]
     ego = next(name for name, agent_id in expected.ids.items() if agent_id == EGO_ID)
     others = [name for name in watched if name != actor]
@@ -259,7 +256,7 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
     gaps_m = dict.fromkeys(_STRAIGHT, np.hypot(ahead, left))
     gaps_m |= {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}
     gap_m = foreign.look_up(gaps_m, kind, place)
-    if foreign.look_up(_SWITCH, element.get("freespace", "false").lower(), place):
+    if read_switch(element, "freespace", place):
         sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
         gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
     return np.asarray(gap_m)

@@ -155,7 +155,7 @@ def _split(event: Element, actors: list[str], doubts: Doubts) -> Iterator[tuple[
             continue
         found = action.find(f"PrivateAction/{ACTIONS.get(kind, '-')}")
         if found is None:
-            doubts.assume(f"{kind} was left out, first in {place}")
+            doubts.faults[kind].append(place)
         else:
             actions.append((kind, found))
     names = (event.get("name", ""), *(a.get("name", "") for a in event.findall("Action")))

@@ -286,8 +286,6 @@ class _Draft:
         goal_mps = read_speed_target(
             action, lambda name: expected.find_states(name, place)[step, 3], f"{place}.SpeedAction"
         )
-        is_kept = action.find(".//RelativeTargetSpeed[@continuous='true']") is not None
-        self._doubts.assume("A speed that is kept relative to somebody is taken once", is_kept)
         dynamics = _find(action, "SpeedActionDynamics", place)
         by, kind = dynamics.get("dynamicsDimension"), dynamics.get("dynamicsShape")
         value = abs(read_float(dynamics, "value", place, default=0.0))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, Traffic
 from augment.scene.motion import STEP_S, read_at
 from augment.scene.recording import Track
 
-_LIGHT_ACTION = "TrafficSignalStateAction"
+_LIGHT_ACTION, _PHASE_ACTION = "TrafficSignalStateAction", "TrafficSignalControllerAction"
 LONGEST_S = 60.0
 """Trajectories are read so far."""
 _STATES = foreign.name_all(
@@ -95,17 +95,24 @@ class _Scenario:
         self._entities = self._source.entities()
         self._events = list_events(self._source)
         self._positions, self._speeds = dict[str, Element](), dict[str, Element]()
+        self._starts = dict[str, Element]()
         for private in self._source.root.findall("Storyboard/Init/Actions/Private"):
             for action in private.findall("PrivateAction"):
                 self._begin(private.get("entityRef", ""), action)
         for action in self._source.root.findall("Storyboard/Init/Actions/GlobalAction"):
-            if (kind := describe_action(action)) != _LIGHT_ACTION:
+            if (kind := describe_action(action)) not in (_LIGHT_ACTION, _PHASE_ACTION):
                 self._doubts.assume(f"{kind} at t0 was left out")
         read = self._doubts.read
         self._mps = {name: read("speeds", self._read_speed, name) for name in self._speeds}
         self._placer = PositionReader(self._network, self._positions)
+        for name in (name for name in self._starts if name not in self._positions):
+            with self._doubts.about("entities"):
+                rows, _ = trace(self._starts[name], (0.0, 0.0), self._placer.at({}, name), name)
+                x, y, h = map(repr, rows[0].tolist())
+                self._positions[name] = Element("Position")
+                SubElement(self._positions[name], "WorldPosition", x=x, y=y, h=h)
         self._middles = dict[str, FloatArray]()
-        for name in self._entities.keys() & self._positions.keys():
+        for name in (name for name in self._entities if name in self._positions):
             with self._doubts.about("entities"):
                 pose = self._placer.entity_pose(name)
                 (middle,) = pose.to_parent(np.array([self._entities[name].centre_m]))
@@ -217,6 +224,8 @@ class _Scenario:
         elif kind == "SpeedAction" and found is not None and _is_step(found):
             self._speeds[name] = found
         elif found is not None:
+            if kind == "FollowTrajectoryAction":
+                self._starts[name] = found
             made = StoryEvent(
                 place=f"Init of {name[:40]}", names=(), groups=(), actions=((kind, found),)
             )
@@ -254,11 +263,18 @@ class _Scenario:
     def _lights(self) -> dict[str, TrafficLight]:
         """Return the states of lights at t0, by their ids."""
         root, rows = self._source.root, list[tuple[str, str]]()
-        for phases in root.iterfind("RoadNetwork//TrafficSignalController"):
-            first = phases.find("Phase")
-            for state in [] if first is None else first.findall("TrafficSignalState"):
-                rows.append((state.get("trafficSignalId", ""), state.get("state", "")))
-        for action in root.iterfind(f"Storyboard/Init/Actions/GlobalAction//{_LIGHT_ACTION}"):
+        actions = root.findall("Storyboard/Init/Actions/GlobalAction//*")
+        chosen = {a.get("trafficSignalControllerRef"): a.get("phase") for a in actions}
+        for controller in root.iterfind("RoadNetwork//TrafficSignalController"):
+            name, place = controller.get("name", ""), "phase of a light's controller"
+            phases = {phase.get("name"): phase for phase in controller.iterfind("Phase")}
+            with self._doubts.about("states of lights"):
+                if name not in chosen and read_float(controller, "delay", place, default=0.0):
+                    raise fault_at(place, f"{name[:40]} begins later, by its delay")
+                phase = foreign.look_up(phases, chosen.get(name, next(iter(phases), None)), place)
+                for state in phase.iterfind("TrafficSignalState"):
+                    rows.append((state.get("trafficSignalId", ""), state.get("state", "")))
+        for action in (a for a in actions if a.tag == _LIGHT_ACTION):
             rows.append((action.get("name", ""), action.get("state", "")))
         lights = {}
         for name, text in rows:
@@ -316,7 +332,8 @@ class _Scenario:
             absent = (times_s < track_s[0] - 1e-6) | (times_s > self._gone_s[name] + 1e-6)
             states[absent] = np.nan
         if name in self._middles:
-            states[0] = [*self._middles[name], self._mps.get(name) or 0.0]
+            mps = self._mps.get(name, float(np.nan_to_num(states[0, 3])))
+            states[0] = [*self._middles[name], mps or 0.0]
         return states
 
     def _track(self, name: str, states: FloatArray) -> Track:

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element
 from augment import foreign
 from augment.foreign import Doubts, fault_at
 from augment.formats.documents import read_xml
+from augment.formats.opendrive.geometry import read_switch
 from augment.formats.opendrive.network import RoadNetwork
 from augment.formats.openscenario.parameters import resolve
 from augment.scene.entities import AgentType
@@ -109,6 +110,17 @@ class ScenarioSource:
         counts = [element.get("maximumExecutionCount", "1") for element in self.root.iter()]
         repeated = sum(count.strip() != "1" for count in counts)
         self.doubts.assume("What may happen several times happens once", repeated)
+        kept = self._count_switched(".//RelativeTargetSpeed", "continuous")
+        self.doubts.assume("A speed that is kept relative to somebody is taken once", kept)
+        conditions = ".//Story//StartTrigger//EntityCondition/*"
+        frames = [e.get("coordinateSystem", "entity") for e in self.root.iterfind(conditions)]
+        along = len(frames) - frames.count("entity")
+        along += self._count_switched(conditions, "alongRoute")
+        self.doubts.assume("A distance along roads is taken as the one between places", along)
+
+    def _count_switched(self, path: str, name: str) -> int:
+        rows = ((e, name, e.tag) for e in self.root.iterfind(path))
+        return sum(self.doubts.read_all("switches", read_switch, rows))
 
     def _fill_references(self, root: Element, depth: int = 0) -> None:
         for holder in [part for part in root.iter() if part.tag in _REFERRING]:
