@@ -65,6 +65,16 @@ def test_who_is_put_nowhere_begins_on_its_trajectory(
     assert other.speed_mps == (0.0 if "None" in times else pytest.approx(10.0))
 
 
+def test_who_begins_on_its_trajectory_heads_along_it(tmp_path: Path) -> None:
+    turn_rad, place = math.atan(0.75), '<Position><WorldPosition x="{}" y="{}"/></Position>'
+    ends = "".join(
+        f"<Vertex>{place.format(*end)}</Vertex>" for end in ((80, -1.7504), (120, 28.2496))
+    )
+    at = f'<WorldPosition x="80" y="-1.7504" h="{turn_rad}"/>'
+    states = move_other(tmp_path, event(follow(ends)), other_at=at).states
+    assert states[:, 2] == pytest.approx(turn_rad, abs=0.002)
+
+
 @pytest.mark.parametrize("way", ["2", "4"])
 @pytest.mark.parametrize("is_in_catalog", [False, True])
 def test_a_route_is_kept_as_lanes(way: str, is_in_catalog: bool, tmp_path: Path) -> None:

@@ -352,12 +352,11 @@ class _Draft:
         before = [self._pose_after(m, place) for m in np.arange(2.0, gone_m, 2.0)]
         rows = np.array([*((pose.x_m, pose.y_m) for pose in before), *points]).reshape(-1, 2)
         apart = np.append(np.hypot(*np.diff(rows, axis=0).T) > 0.005, True)
-        kept = rows[apart]
-        thinned = np.round(_thin(kept), 4)
-        self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
-        here = np.array([[self._here.x_m, self._here.y_m]])
-        line = np.vstack([here, kept])
-        self._line = Polyline(line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > 0.005)])
+        line = np.vstack([[self._here.x_m, self._here.y_m], rows[apart]])
+        # Where it begins, but for rounding, is no point of its way.
+        line = line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > 0.005)]
+        thinned = np.round(_thin(line[1:]), 4).tolist()
+        self.path, self._line = PointPath(points_m=tuple(map(tuple, thinned))), Polyline(line)
 
     def _pose_after(self, gone_m: float, place: str) -> Pose:
         """Return where it is so far after its start."""
