@@ -214,6 +214,13 @@ PARKED = (
          "ended the lanes of the other"),
         ({"end": f'<objects><tunnel id="1"/>{PARKED}</objects>'}, "object tunnel"),
         ({"end": f'<objects>{PARKED}</objects>'}, "An object that is repeated was laid once"),
+        ({"end": '<lanes layer="temporary"><laneSection s="0"/></lanes>'}, "Lanes of a layer"),
+        ({"outer": f'<lane id="-1" type="bus">{WIDTH}</lane>'}, "Of two lanes with one id"),
+        ({"rest": ROAD.format(
+            **{"id": "1", "junction": "-1", "more": "", "type": "", "link": "", "offset": ""},
+            **{"x": "100", "shape": "<line/>", "end": "",
+               "lanes": LANES.format(width=WIDTH, outer="")},
+        )}, "Of two roads with one id the last counts"),
     ],
 )  # fmt: skip
 def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: Path) -> None:

@@ -230,6 +230,8 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
         (scenario(other_at='<RelativeObjectPosition entityRef="Other" dx="1" dy="0"/>'),
          "refers to itself in a circle"),
         (scenario(other='<MiscObject miscObjectCategory="tree"/>'), "A tree was left out"),
+        (scenario(other=f'{CAR}</ScenarioObject><ScenarioObject name="Other">{CAR}'),
+         "Of two entities with one id the last counts"),
         (scenario(other_does=("<ControllerAction/>",)), "ControllerAction at t0 was left out"),
         (scenario(event(BRAKES, by_entity('<SpeedCondition value="1" rule="greaterThan"/>')
                         .replace("<Condition>", '<Condition conditionEdge="rising">'))),

@@ -33,6 +33,8 @@ START, END = "predecessor", "successor"
 """The ends of a road or lane, as links call them."""
 CONTACTS = {"start": START, "end": END}
 _RULES = {"RHT": False, "LHT": True}
+_LAYER = "permanent"
+"""The only one before OpenDRIVE 1.9, where links name one as well."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,7 +164,8 @@ class RoadNetwork:
         offset = self.root.find("header/offset")
         if offset is not None and any(value.strip("0.+-eE") for value in offset.attrib.values()):
             self.doubts.assume("The header's offset was left out: places are the file's own")
-        self.elements = {element.get("id", ""): element for element in self.root.findall("road")}
+        roads = [(element.get("id", ""), element) for element in self.root.findall("road")]
+        self.elements = self.doubts.index_last("roads", roads)
         if not self.elements:
             raise fault_at(path.name, "holds no road")
 
@@ -228,7 +231,10 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
     road_id = element.get("id", "")
     place = f"road {road_id[:20]}"
     line = ReferenceLine(element.find("planView"), place)
-    sections = element.findall("lanes/laneSection")
+    layers = [e for e in element.findall("lanes") if e.get("layer", _LAYER) == _LAYER]
+    others = len(element.findall("lanes")) - len(layers)
+    doubts.assume("Lanes of a layer that is not permanent were left out", others)
+    sections = [section for lanes in layers for section in lanes.findall("laneSection")]
     if not 1 <= len(sections) <= MOST_SECTIONS:
         text = f"has {len(sections)} lane sections; 1 to {MOST_SECTIONS} are read"
         raise fault_at(place, text)
@@ -259,7 +265,8 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
         links=_read_links(element, place, doubts),
         line=line,
         lane_offset=PiecewiseCubic.read(
-            element.findall("lanes/laneOffset"), "s", f"{place}.laneOffset"
+            (row for lanes in layers for row in lanes.findall("laneOffset")),
+            *("s", f"{place}.laneOffset"),
         ),
         sections=tuple(
             Section(start_m=start_m, end_m=end_m, lanes=_read_lanes(section, place, doubts))
@@ -285,7 +292,7 @@ def _read_links(element: Element, place: str, doubts: Doubts) -> dict[str, tuple
 
 
 def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLane]:
-    lanes = {}
+    lanes = []
     for side, least, most in (("left", 1, 1_000), ("right", -1_000, -1)):
         for element in section.findall(f"{side}/lane"):
             number = foreign.read_whole(element.get("id"), f"{road}.{side}.lane", least, most)
@@ -295,7 +302,7 @@ def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLa
             doubts.assume(LIMIT_CHANGES, len(changes))
             is_odd = element.get("direction", "standard") != "standard"
             doubts.assume("A lane's direction was left out: it is that of its side", is_odd)
-            lanes[number] = RoadLane(
+            lane = RoadLane(
                 kind=element.get("type", "none"),
                 widths=PiecewiseCubic.read(widths or element.findall("border"), "sOffset", place),
                 is_border=not widths and element.find("border") is not None,
@@ -303,12 +310,14 @@ def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLa
                     end: tuple(
                         foreign.read_whole(link.get("id"), f"{place}.link")
                         for link in element.findall(f"link/{end}")
+                        if link.get("layer", _LAYER) == _LAYER
                     )
                     for end in (START, END)
                 },
                 speed_limit_mps=_read_limit(speeds[0] if speeds else None, place, doubts),
             )
-    return lanes
+            lanes.append((number, lane))
+    return doubts.index_last("lanes", lanes)
 
 
 def _read_limit(speed: Element | None, place: str, doubts: Doubts) -> float | None:

@@ -176,7 +176,7 @@ class ScenarioSource:
         """Return everybody by name; who can't be read, or is scenery, is a doubt."""
         objects = self.root.findall("Entities/ScenarioObject")
         entities = self.doubts.read_all("entities", self._read_entity, ((o,) for o in objects))
-        return {entity.name: entity for entity in entities}
+        return self.doubts.index_last("entities", [(entity.name, entity) for entity in entities])
 
     def resolve_reference(self, reference: Element) -> Element:
         """Return the entry of a catalog that is referred to, with its parameters' values.
