@@ -216,9 +216,8 @@ def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) ->
     doubts.doubt_unknown("objects", TYPE_OF, names, "category.name")
     rows = [row for row in rows if kinds.get(row[1]) in TYPE_OF]
     boxes = _numbers(rows, "frame token", "x_m y_m heading_rad", "vx vy length_m width_m", doubts)
-    step_of = {frame: step for step, frame in enumerate(frames)}
     return boxes.assign(
-        step=boxes["frame"].map(step_of),
+        step=boxes["frame"].map({frame: step for step, frame in enumerate(frames)}),
         track=[
             token.hex() if isinstance(token, bytes) else str(token) for token in boxes["token"]
         ],

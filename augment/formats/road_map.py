@@ -265,5 +265,4 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
             inside.add(first_name)
     forks = {fork for name in inside for fork in forked[name]}
     merges = {merge for name in inside for merge in merged[name]}
-    beside = {name for name in names if forked[name] & forks and merged[name] & merges}
-    return inside | beside
+    return inside | {name for name in names if forked[name] & forks and merged[name] & merges}

@@ -70,8 +70,7 @@ def road_around(city: RoadMap, ego: Pose, reach_m: float = RADIUS_M) -> MapExtra
     """
     strips, far = dict[Name, Strip](), 0
     for segment in city.segments:
-        place = f"{city.place}.{segment.name}"
-        with city.doubts.about("lanes"), refuse_shape(place):
+        with city.doubts.about("lanes"), refuse_shape(f"{city.place}.{segment.name}"):
             strip = _strip(segment, ego, reach_m)
             far += strip is None
             strips |= {} if strip is None else {segment.name: strip}

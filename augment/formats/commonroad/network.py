@@ -89,8 +89,7 @@ def read_points(parent: Element, place: str) -> FloatArray:
     Raises:
         InvalidDocument: A coordinate is missing or no number.
     """
-    points = parent.findall("point")
-    rows = [(point.findtext("x"), point.findtext("y")) for point in points]
+    rows = [(point.findtext("x"), point.findtext("y")) for point in parent.findall("point")]
     return foreign.read_finite(rows, place, 2)
 
 

@@ -151,8 +151,7 @@ def _root(path: Path) -> tuple[Element, float]:
     if root.tag != "commonRoad" or version not in VERSIONS:
         text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"
         raise fault_at(path.name, f"{text} {' or '.join(VERSIONS)}")
-    step_s = foreign.read_number(root.get("timeStepSize"), "timeStepSize", 0.001, 10.0)
-    return root, step_s
+    return root, foreign.read_number(root.get("timeStepSize"), "timeStepSize", 0.001, 10.0)
 
 
 def _problem(element: Element, states: StateReader) -> Obstacle:

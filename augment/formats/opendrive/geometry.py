@@ -31,7 +31,6 @@ _CURVATURES = {
     **dict.fromkeys(("poly3", "paramPoly3"), ()),
 }
 """The attributes that name a piece's curvatures, by its kind."""
-_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 
 
 def read_float(
@@ -45,11 +44,6 @@ def read_float(
 ) -> float:
     """Return an attribute that is a number; raises InvalidDocument as `foreign.read_number`."""
     return foreign.read_number(element.get(name, default), f"{place}.{name}", least, most)
-
-
-def read_switch(element: Element, name: str, place: str) -> bool:
-    """Return an attribute that is a boolean, False without it."""
-    return foreign.look_up(_SWITCH, element.get(name, "false").lower(), f"{place}.{name}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -181,8 +175,7 @@ def _follow_spiral(
     """x, y, heading (N, 3) along a line of linear curvature from the origin, ahead at first."""
     rate_pm2 = (last_pm - first_pm) / length_m
     panel_m = min(_PANEL_M, _PANEL_RAD / max(abs(first_pm), abs(last_pm)))
-    grid_m = np.linspace(0.0, length_m, math.ceil(length_m / panel_m) + 1)
-    ends_m = np.union1d(grid_m, way_m)
+    ends_m = np.union1d(np.linspace(0.0, length_m, math.ceil(length_m / panel_m) + 1), way_m)
     sizes_m = np.diff(ends_m)
     # (panels, 5) stations, and the headings there: the integral of the curvature.
     inner_m = ends_m[:-1, None] + sizes_m[:, None] * _NODES

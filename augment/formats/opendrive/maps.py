@@ -124,8 +124,7 @@ def _lay_section(
     # Kinks are among the stations.
     profiles = [lane.widths.starts_m + section.start_m for lane in section.lanes.values()]
     kinks_m = np.concatenate([road.line.starts_m, road.lane_offset.starts_m, *profiles])
-    inside = (kinks_m > section.start_m) & (kinks_m < section.end_m)
-    s_m = np.union1d(grid_m, kinks_m[inside])
+    s_m = np.union1d(grid_m, kinks_m[(kinks_m > section.start_m) & (kinks_m < section.end_m)])
     for lane_id, (right_m, left_m) in road.edges_at(section, s_m).items():
         lane = section.lanes[lane_id]
         if (left_m - right_m).max() < _NARROWEST_M:
@@ -195,8 +194,7 @@ def _join(
 ) -> dict[LaneKey, list[LaneKey]]:
     """Return which segments follow each one."""
     following: dict[LaneKey, list[LaneKey]] = {key: [] for key in segments}
-    joints = chain(_list_links(roads, segments), _list_connections(network, roads))
-    for ends in joints:
+    for ends in chain(_list_links(roads, segments), _list_connections(network, roads)):
         if not all(key in segments for key, _ in ends):
             continue
         # People leave a lane at its end if they drive along s on it, else at its start.

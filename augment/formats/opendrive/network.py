@@ -232,8 +232,8 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
     place = f"road {road_id[:20]}"
     line = ReferenceLine(element.find("planView"), place)
     layers = [e for e in element.findall("lanes") if e.get("layer", _LAYER) == _LAYER]
-    others = len(element.findall("lanes")) - len(layers)
-    doubts.assume("Lanes of a layer that is not permanent were left out", others)
+    text = "Lanes of a layer that is not permanent were left out"
+    doubts.assume(text, len(element.findall("lanes")) - len(layers))
     sections = [section for lanes in layers for section in lanes.findall("laneSection")]
     if not 1 <= len(sections) <= MOST_SECTIONS:
         text = f"has {len(sections)} lane sections; 1 to {MOST_SECTIONS} are read"

@@ -3,7 +3,6 @@
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -96,8 +95,7 @@ def _list_places(
             s_m = np.append(s_m + 0.0005, section.end_m - 0.001).round(3)
             for lane_id, (right_m, left_m) in road.edges_at(section, s_m).items():
                 if section.lanes[lane_id].is_driven:
-                    middle = road.places_at(s_m, (right_m + left_m) / 2.0)[:, :2]
-                    local = ego.to_local(middle)
+                    local = ego.to_local(road.places_at(s_m, (right_m + left_m) / 2.0)[:, :2])
                     near = np.hypot(*local.T) <= reach_m
                     rows = np.column_stack([s_m, local.round(1)])[near]
                     places[f"{road.id},{lane_id}"] += map(tuple, rows.tolist())
@@ -106,10 +104,8 @@ def _list_places(
 
 def _offer_places(network: RoadNetwork) -> Iterator[str]:
     """Yield the middle of each lane, of connecting roads last."""
-    elements = network.elements.items()
-    outer = (name for name, road in elements if road.get("junction", "-1") == "-1")
-    inner = (name for name, road in elements if road.get("junction", "-1") != "-1")
-    for name in chain(outer, inner):
+    roads = network.elements
+    for name in sorted(roads, key=lambda name: roads[name].get("junction", "-1") != "-1"):
         for road in network.doubts.read_all("roads", network.road, [(name,)]):
             s_m = round(road.line.length_m / 2.0, 1)
             for lane_id, lane in road.sections[road.section_at(s_m)].lanes.items():

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.opendrive.geometry import read_float, read_switch
+from augment.formats.opendrive.geometry import read_float
 from augment.formats.openscenario.events import BEGUN, ENDED, WAIT, Groups, StoryEvent, has_begun
 from augment.formats.openscenario.trajectories import place_beside
 from augment.geometry.frames import Pose
@@ -31,6 +31,7 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = 
     "risingOrFalling": lambda now, before, begun: now != before,
     "carla:latched": lambda now, before, begun: np.maximum.accumulate(now & begun),
 }
+_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
 _USUAL = {
     "ReachPositionCondition": ("tolerance", "lessOrEqual"),
@@ -256,7 +257,7 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
     gaps_m = dict.fromkeys(_STRAIGHT, np.hypot(ahead, left))
     gaps_m |= {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}
     gap_m = foreign.look_up(gaps_m, kind, place)
-    if read_switch(element, "freespace", place):
+    if foreign.look_up(_SWITCH, element.get("freespace", "false").lower(), place):
         sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
         gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
     return np.asarray(gap_m)
@@ -273,8 +274,7 @@ def _measure_collision(
 
 def _measure_way(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
     places = expected.find_states(name, place)[:, :2]
-    steps_m = np.hypot(*np.diff(places, axis=0, prepend=places[:1]).T)
-    return np.asarray(np.cumsum(steps_m) + 1e-9)
+    return np.cumsum(np.hypot(*np.diff(places, axis=0, prepend=places[:1]).T)) + 1e-9
 
 
 def _measure_speed_over(

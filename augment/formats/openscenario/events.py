@@ -159,6 +159,5 @@ def _split(event: Element, actors: list[str], doubts: Doubts) -> Iterator[tuple[
         else:
             actions.append((kind, found))
     names = (event.get("name", ""), *(a.get("name", "") for a in event.findall("Action")))
-    made = StoryEvent(place=place, names=names, groups=(), actions=tuple(actions))
     for actor in sorted(owners) if actions else ():
-        yield actor, made
+        yield actor, StoryEvent(place=place, names=names, groups=(), actions=tuple(actions))

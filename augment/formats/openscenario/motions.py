@@ -100,16 +100,15 @@ class Stage:
         self, event: StoryEvent, name: str, doubts: Doubts
     ) -> tuple[planned.Trigger, int]:
         """Return how an event begins, and the step; an ego that stands may have to set off."""
-        self._set_off(self.scene.ego.speed_mps)  # it may have for another alone
-        with suppress(InvalidDocument):
-            return find_trigger(event, name, self.expected, doubts)
-        if self._recording is None and self._ego_mps == 0.0:
-            self._set_off(_USUAL_MPS)
+        own_mps = self.scene.ego.speed_mps  # it may have set off for another alone
+        for mps in (own_mps, *[_USUAL_MPS] * (self._recording is None and own_mps == 0.0)):
+            self._set_off(mps)
             with suppress(InvalidDocument):
                 found = find_trigger(event, name, self.expected, doubts)
-                doubts.assume(f"The ego stands: who waits for it sees it at {_USUAL_MPS:g} m/s")
+                text = f"The ego stands: who waits for it sees it at {_USUAL_MPS:g} m/s"
+                doubts.assume(text, mps != own_mps)
                 return found
-            self._set_off(0.0)
+        self._set_off(own_mps)
         return find_trigger(event, name, self.expected, doubts)  # says why not
 
     def find_point(self, position: Element, place: str) -> Pose:
@@ -280,8 +279,7 @@ class _Draft:
     # Actions; each returns how long it takes
 
     def _change_speed(self, action: Element, at_s: float, place: str) -> float:
-        own_mps = self._agent.speed_mps
-        now_mps = way_and_speed(tuple(self.speeds), own_mps, at_s)[1]
+        now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)[1]
         step, expected = self._step_since(at_s), self._stage.expected
         goal_mps = read_speed_target(
             action, lambda name: expected.find_states(name, place)[step, 3], f"{place}.SpeedAction"
@@ -310,8 +308,7 @@ class _Draft:
         value = abs(read_float(dynamics, "value", place))
         here = self._pose_after(gone_m, place)
         graph, target = self._stage.graph, _find(action, "LaneChangeTarget/*", place)
-        step = self._step_since(at_s)
-        goal = self._stage.find_lane(self._name, here, target, step, place)
+        goal = self._stage.find_lane(self._name, here, target, self._step_since(at_s), place)
         apart_m = math.hypot(goal.x_m - here.x_m, goal.y_m - here.y_m)
         by = {"time": value, "rate": apart_m / max(value, 1e-3), "distance": 0.0}
         lasts_s = foreign.look_up(by, dynamics.get("dynamicsDimension"), place)
@@ -460,8 +457,7 @@ def _thin(rows: FloatArray) -> FloatArray:
     kept = np.unique([0, len(rows) - 1])
     while 1 < len(kept) < _MOST_POINTS:
         off_m = np.hypot(*(PchipInterpolator(ways_m[kept], rows[kept])(ways_m) - rows).T)
-        gaps = np.split(off_m, kept[1:-1])
-        worst = kept[:-1] + [int(gap.argmax()) for gap in gaps]
+        worst = kept[:-1] + [int(gap.argmax()) for gap in np.split(off_m, kept[1:-1])]
         worst = worst[off_m[worst] > _THIN_M]
         if not len(worst):
             break

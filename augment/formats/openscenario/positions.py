@@ -120,9 +120,8 @@ class PositionReader:
         return min(best, key=lambda row: row[:2])[2]
 
     def _find_world(self, element: Element, place: str) -> Pose:
-        heading_rad = _number(element, "h")
         x_m, y_m = (read_float(element, name, place) for name in "xy")
-        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(_number(element, "h")))
 
     def _find_lane(self, element: Element, place: str) -> Pose:
         road = self._network.road(element.get("roadId", ""), f"{place}.roadId")

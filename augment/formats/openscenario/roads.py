@@ -112,8 +112,7 @@ def _offsets(edge: Polyline, points: FloatArray, tangents: FloatArray) -> FloatA
     """Return the signed distance, left positive, of an edge from each point of a line."""
     offsets = []
     for point, (cos, sin) in zip(points, tangents, strict=True):
-        place = edge.project(float(point[0]), float(point[1]))
-        x_m, y_m = edge.position(place.s_m)
+        x_m, y_m = edge.position(edge.project(float(point[0]), float(point[1])).s_m)
         offsets.append((y_m - point[1]) * cos - (x_m - point[0]) * sin)
     return np.array(offsets, dtype=np.float64)
 

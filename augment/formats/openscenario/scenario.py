@@ -262,7 +262,7 @@ class _Scenario:
 
     def _lights(self) -> dict[str, TrafficLight]:
         """Return the states of lights at t0, by their ids."""
-        root, rows = self._source.root, list[tuple[str, str]]()
+        root, rows = self._source.root, list[tuple[Element, str]]()
         actions = root.findall("Storyboard/Init/Actions/GlobalAction//*")
         chosen = {a.get("trafficSignalControllerRef"): a.get("phase") for a in actions}
         for controller in root.iterfind("RoadNetwork//TrafficSignalController"):
@@ -272,14 +272,12 @@ class _Scenario:
                 if name not in chosen and read_float(controller, "delay", place, default=0.0):
                     raise fault_at(place, f"{name[:40]} begins later, by its delay")
                 phase = foreign.look_up(phases, chosen.get(name, next(iter(phases), None)), place)
-                for state in phase.iterfind("TrafficSignalState"):
-                    rows.append((state.get("trafficSignalId", ""), state.get("state", "")))
-        for action in (a for a in actions if a.tag == _LIGHT_ACTION):
-            rows.append((action.get("name", ""), action.get("state", "")))
+                rows += [(e, "trafficSignalId") for e in phase.iterfind("TrafficSignalState")]
         lights = {}
-        for name, text in rows:
+        for element, named in (*rows, *((a, "name") for a in actions if a.tag == _LIGHT_ACTION)):
+            name, text = element.get(named, ""), element.get("state", "").lower()
             with self._doubts.about("states of lights"):
-                lights[name] = foreign.look_up(_STATES, text.lower(), f"light {name[:40]}")
+                lights[name] = foreign.look_up(_STATES, text, f"light {name[:40]}")
         return lights
 
     # Trajectories by the clock
@@ -332,8 +330,8 @@ class _Scenario:
             absent = (times_s < track_s[0] - 1e-6) | (times_s > self._gone_s[name] + 1e-6)
             states[absent] = np.nan
         if name in self._middles:
-            mps = self._mps.get(name, float(np.nan_to_num(states[0, 3])))
-            states[0] = [*self._middles[name], mps or 0.0]
+            mps = self._mps.get(name, states[0, 3])
+            states[0] = np.nan_to_num([*self._middles[name], mps or 0.0])
         return states
 
     def _track(self, name: str, states: FloatArray) -> Track:

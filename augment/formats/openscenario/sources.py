@@ -14,7 +14,6 @@ from xml.etree.ElementTree import Element
 from augment import foreign
 from augment.foreign import Doubts, fault_at
 from augment.formats.documents import read_xml
-from augment.formats.opendrive.geometry import read_switch
 from augment.formats.opendrive.network import RoadNetwork
 from augment.formats.openscenario.parameters import resolve
 from augment.scene.entities import AgentType
@@ -28,7 +27,7 @@ _REFERRING = (
 _DEEPEST, _MOST_ENTRIES = 3, 1_000
 """Entries in each other, as of a route in a maneuver, and in all."""
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
-_MOST_FILES, _LONGEST_PATH = 500, 250
+_MOST_FILES, _LONGEST_PATH, _NO = 500, 250, ("false", "0")
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
 _CLASSES = foreign.name_all(
     {
@@ -110,17 +109,13 @@ class ScenarioSource:
         counts = [element.get("maximumExecutionCount", "1") for element in self.root.iter()]
         repeated = sum(count.strip() != "1" for count in counts)
         self.doubts.assume("What may happen several times happens once", repeated)
-        kept = self._count_switched(".//RelativeTargetSpeed", "continuous")
+        relative = [e.get("continuous", _NO[0]) for e in self.root.iter("RelativeTargetSpeed")]
+        kept = sum(text.lower() not in _NO for text in relative)
         self.doubts.assume("A speed that is kept relative to somebody is taken once", kept)
-        conditions = ".//Story//StartTrigger//EntityCondition/*"
-        frames = [e.get("coordinateSystem", "entity") for e in self.root.iterfind(conditions)]
-        along = len(frames) - frames.count("entity")
-        along += self._count_switched(conditions, "alongRoute")
-        self.doubts.assume("A distance along roads is taken as the one between places", along)
-
-    def _count_switched(self, path: str, name: str) -> int:
-        rows = ((e, name, e.tag) for e in self.root.iterfind(path))
-        return sum(self.doubts.read_all("switches", read_switch, rows))
+        conditions = self.root.findall(".//Story//StartTrigger//EntityCondition/*")
+        along = [e.get("coordinateSystem", "entity") != "entity" for e in conditions]
+        along += [e.get("alongRoute", _NO[0]).lower() not in _NO for e in conditions]
+        self.doubts.assume("A distance along roads is taken as the one between places", sum(along))
 
     def _fill_references(self, root: Element, depth: int = 0) -> None:
         for holder in [part for part in root.iter() if part.tag in _REFERRING]:
@@ -244,11 +239,10 @@ class ScenarioSource:
             0.0 if box is None else foreign.read_number(box.get(n, "0"), f"{place}.{n}")
             for box, n in ((centre, "x"), (centre, "y"), (size, "length"), (size, "width"))
         )
-        properties = body.findall("Properties/Property")
         return Entity(
             name=name,
             type=_CLASSES.get(category, AgentType.GENERIC_OBJECT),
             centre_m=(ahead_m, left_m),
             size_m=(length_m, width_m),
-            is_ego=any(p.get("value") == "ego_vehicle" for p in properties),
+            is_ego=body.find("Properties/Property[@value='ego_vehicle']") is not None,
         )

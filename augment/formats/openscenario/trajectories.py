@@ -9,8 +9,7 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import FloatArray, fault_at
-from augment.formats.opendrive import geometry
-from augment.formats.opendrive.geometry import LONGEST_M, LinePiece, read_float, read_switch
+from augment.formats.opendrive.geometry import LONGEST_M, SHARPEST_PM, LinePiece, read_float
 from augment.formats.openscenario.positions import PositionReader
 from augment.geometry.frames import Pose
 
@@ -84,7 +83,7 @@ def _follow_vertices(
     has_times = action.find("TimeReference/Timing") is not None and all(
         "time" in vertex.attrib for vertex in vertices
     )
-    is_closed = any(read_switch(t, "closed", place) for t in action.iter("Trajectory"))
+    is_closed = {t.get("closed", "").lower() for t in action.iter("Trajectory")} & {"true", "1"}
     if is_closed and not has_times:  # nobody says when it would be back at its first
         vertices += vertices[:1]
     positions = [position for vertex in vertices for position in vertex.findall("Position")]
@@ -106,7 +105,7 @@ def _follow_vertices(
 
 def _follow_spirals(shape: Element, action: Element, placer: PositionReader, place: str) -> Traced:
     """Rows a metre apart along a clothoid, or several that go on from each other."""
-    parts, pose, bounds = list[FloatArray](), None, (-geometry.SHARPEST_PM, geometry.SHARPEST_PM)
+    parts, pose, bounds = list[FloatArray](), None, (-SHARPEST_PM, SHARPEST_PM)
     is_spline = shape.tag == "ClothoidSpline"
     names = ("timeStart", "timeEnd") if is_spline else ("startTime", "stopTime")
     # Some call a segment by its type.

@@ -133,8 +133,7 @@ def _report(cell: Cell, report: LossReport) -> None:
 def _track(movement: Movement) -> dict[str, Any]:
     agent, present = movement.agent, movement.is_present
     states = np.where(present[:, None], movement.states, 0.0)
-    steps = len(states)
-    z = np.zeros((steps, 1))
+    z = np.zeros((len(states), 1))
     way = np.column_stack([np.cos(states[:, 2]), np.sin(states[:, 2])])
     if writing.keeps_heading(agent):
         steps_m = np.gradient(states[:, :2], axis=0)

@@ -87,8 +87,7 @@ def _log(file: str, number: int, payload: bytes) -> Log:
     unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
     if not scenario.HasField("current_time_index"):
         doubts.assume("A current step that is not given is the first")
-    bounds = "current_time_index", 0, len(times_s) - 1
-    current = scenario.current_time_index, *bounds
+    current = scenario.current_time_index, "current_time_index", 0, len(times_s) - 1
     name = scenario.scenario_id[:100].decode("ascii", errors="replace")
     return Log(
         times_s=times_s,
