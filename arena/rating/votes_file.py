@@ -342,12 +342,12 @@ def _read_book(content: io.BytesIO) -> VotesTable:
         # No entry gives more than it declares.
         _check_size(sum(entry.file_size for entry in archive.infolist()))
     book = load_workbook(content, read_only=True, data_only=True)
-    sheets = [_sheet_rows(sheet) for sheet in book.worksheets]
-    heads = [(next(rows, (0, ())), rows) for rows in sheets]
+    heads = [(next(rows, (0, ())), rows) for rows in map(_sheet_rows, book.worksheets)]
     if not heads:
         raise VotesFileUnreadable("it has no sheet")
     names = [[_column_name(str(cell)) for cell in head] for (_, head), _ in heads]
-    best = max(range(len(heads)), key=lambda sheet: len({*names[sheet]} & {*_KNOWN}))
+    is_shown = [sheet.sheet_state == "visible" for sheet in book.worksheets]
+    best = max(range(len(heads)), key=lambda n: (len({*names[n]} & {*_KNOWN}), is_shown[n]))
     places = _find_columns(names[best])
     unread = sum({*NEEDED} <= {*head} for head in names) - 1
     note = f"Only sheet {book.worksheets[best].title!a} is read; {unread} more have votes."

@@ -118,8 +118,7 @@ def note_left_out(what: str, counts: Mapping[str, int]) -> list[str]:
     names = tuple(sorted(name for name, number in counts.items() if number))
     if not names:
         return []
-    total = sum(counts.values())
-    return [f"{total} {what} were left out: {', '.join(names[:_MOST_NAMED])}."]
+    return [f"{sum(counts.values())} {what} were left out: {', '.join(names[:_MOST_NAMED])}."]
 
 
 # Edges and widths

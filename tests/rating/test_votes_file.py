@@ -95,14 +95,18 @@ def test_a_day_of_excel_or_parquet_is_named_as_in_csv(tmp_path: Path) -> None:
     assert columns_of(tmp_path / "votes") == [["2026-03-01"], ["2026-03-01 09:00:00"], ["tie"]]
 
 
-def test_votes_on_a_further_sheet_are_said_to_be_unread(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("state", "name"), [("visible", "Sheet"), ("hidden", "Sheet1")])
+def test_votes_on_a_further_sheet_are_said_to_be_unread(
+    state: str, name: str, tmp_path: Path
+) -> None:
     book = openpyxl.Workbook()
     for sheet in (book.active, book.create_sheet(), book.create_sheet("about")):
         sheet.append(["note"] if sheet.title == "about" else NAMES)
         sheet.append(["a", "b", "tie"])
+    book.active.sheet_state = state
     book.save(tmp_path / "votes")
     note = read_table(tmp_path / "votes").note
-    assert note == "Only sheet 'Sheet' is read; 1 more have votes."
+    assert note == f"Only sheet '{name}' is read; 1 more have votes."
 
 
 @pytest.mark.parametrize(
