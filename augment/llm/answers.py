@@ -43,16 +43,16 @@ _KINDS = {"refusal": "refusal"} | dict.fromkeys(
     ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
 )
 
-_PASSING = frozenset({408, 409, 425, 429})
+_PASSING = frozenset({408, 409, 424, 425, 429, 498, 499})
 _HEADLINE = re.compile(r"<(title|h1)\b[^>]*>(.*?)</", re.DOTALL | re.IGNORECASE)
 _FILTERED = ("code", "content_filter")
 
 _ASKS_TO_WAIT = re.compile(
-    r"\b(?:try again|retry|wait) (?:in |after |for )?((?:\d+m(?!s))?[\d.]+ ?m?s\w*|\d+ ?min\w*)",
+    r"\b(?:try again|retry|wait) (?:in |after |for )?(\d[\dhm.]* ?m?s\w*|\d+ ?min\w*)",
     re.IGNORECASE,
 )
 _WAIT = re.compile(
-    r"(?:PT)?(?:(?P<minutes>\d+)\s*m(?:in\w*)?)?\s*"
+    r"(?:PT)?(?:(?P<hours>\d+)\s*h)?(?:(?P<minutes>\d+)\s*m(?:in\w*)?)?\s*"
     r"(?:(?P<number>-?\d+(?:\.\d+)?(?:e\d+)?)\s*(?P<unit>ms|s(?:ec\w*)?)?)?",
     re.IGNORECASE,
 )
@@ -71,7 +71,7 @@ class ForeignError:
         parameter: What of the request it names.
         is_withheld: Whether a filter withheld the answer.
         is_spent: Whether a quota or a balance is exhausted, which does not pass by waiting.
-        waits: All that may ask to wait, by name.
+        texts: All of them by name; some ask to wait.
     """
 
     message: str
@@ -79,7 +79,7 @@ class ForeignError:
     parameter: str
     is_withheld: bool
     is_spent: bool
-    waits: Mapping[str, str]
+    texts: Mapping[str, str]
 
     def __str__(self) -> str:
         code = f" ({shorten(self.code, LONGEST_CODE)})" if self.code else ""
@@ -128,10 +128,9 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
     usage = _read(doubts, answer, "usage", dict) or {}
     has_output = bool(calls or "".join([*texts, *thoughts, *refusals]))
     prompt, completion, cached = _read_usage(usage, least_prompt, doubts, has_output=has_output)
-    model = _read(doubts, answer, "model", str) or ""
     return Reply(
         text="".join(texts),
-        model=shorten(model, 120),
+        model=shorten(_read(doubts, answer, "model", str) or "", 120),
         finish_reason=reason,
         refusal=shorten("".join(refusals), LONGEST_REFUSAL) if refusals else None,
         prompt_tokens=prompt,
@@ -160,7 +159,7 @@ def read_error(body: object) -> ForeignError:
         is_withheld=any(says("withheld", code) for code in codes)
         or (says("withheld_sentence", message) and not says("about_account", message)),
         is_spent=any(says("spent", text) for text in (*codes, message)),
-        waits=dict(leaves) | ({"asks": asked[1]} if asked else {}),
+        texts=dict(leaves) | ({"asks": asked[1]} if asked else {}),
     )
 
 
@@ -177,9 +176,11 @@ def fault_of_status(
     """
     page = _HEADLINE.search(body[:LONGEST_REFUSAL]) if isinstance(body, str) else None
     error = read_error(page[2] if page else body)
-    if error.is_withheld and status not in (401, 404) and status not in _PASSING:
+    if error.is_withheld and status not in (401, 404, 429):
         refusal = shorten(error.message or error.code, LONGEST_REFUSAL)
         return Reply(text="", finish_reason="content_filter", refusal=refusal, completion_tokens=0)
+    if error.code in names_of("ill_written"):
+        return Reply(text=error.texts.get("failed_generation", ""))
     message = error.message or (json.dumps(body, ensure_ascii=False) if body else "")
     if "location" in headers:
         message = f"it leads to {headers['location']}; {message}".removesuffix("; ")
@@ -194,7 +195,7 @@ def fault_of_status(
         return ParameterRefused(refused, text, status=status)
     passing = status in _PASSING or (status >= 500 and not says("lacks", error.message))
     passing = passing and not error.is_spent
-    wait_s, remark = _read_wait({**error.waits, **headers}) if passing else (None, "")
+    wait_s, remark = _read_wait({**error.texts, **headers}) if passing else (None, "")
     return ModelFault(text + remark, retryable=passing, status=status, retry_after_s=wait_s)
 
 
@@ -221,8 +222,10 @@ def _read_message(
         pieces.append(("unread", "the message has none of the fields of a message"))
     made: list[ToolCall] = []
     ids: set[str] = set()
-    calls = message.get("tool_calls")
-    calls = calls or _find_uses(message.get("content")) or calls
+    calls, parts = message.get("tool_calls"), message.get("content")
+    # Anthropic puts calls among the parts of a message.
+    parts = [part for part in parts if isinstance(part, dict)] if isinstance(parts, list) else []
+    calls = calls or [part for part in parts if part.get("type") == "tool_use"] or calls
     if calls is None and message.get("function_call"):
         calls = [{"function": message["function_call"]}]  # as it was called before 2024
     if calls is not None and not isinstance(calls, list):
@@ -268,12 +271,6 @@ def _cap(extra: str, path: str, doubts: Doubts) -> str:
     too_much = f"{path} carries more than {LONGEST_EXTRA} characters: left out"
     doubts.faults[_ANSWER].append(too_much)
     return ""
-
-
-def _find_uses(content: object) -> list[object]:
-    """Return the calls that Anthropic puts among the parts of a message."""
-    parts = content if isinstance(content, list) else []
-    return [part for part in parts if isinstance(part, dict) and part.get("type") == "tool_use"]
 
 
 def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str, str]]:
@@ -328,7 +325,7 @@ def _insist_on_answer(
     else:
         return
     is_lasting = error.is_spent or says("lasting", error.code)
-    wait_s, remark = _read_wait(error.waits)
+    wait_s, remark = _read_wait(error.texts)
     text = f"the endpoint {problem}{remark}"
     raise ModelFault(text, retryable=not is_lasting, status=200, retry_after_s=wait_s)
 
@@ -397,7 +394,7 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
         text = str(value).strip()
         if (inner := _inner(name, text)) is not None:
             yield from _leaves(inner, name)
-        elif text:
+        elif text not in ("", "None"):  # as LiteLLM writes what is absent
             yield name, text
 
 
@@ -444,14 +441,14 @@ def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
         match = _WAIT.fullmatch(text)
         try:
             if match is not None:
-                is_ms = name.endswith("-ms") or match["unit"] == "ms"
-                seconds = float(match["number"] or 0) / (1000.0 if is_ms else 1.0)
-                seconds += 60.0 * float(match["minutes"] or 0)
+                scale = 0.001 if name.endswith("-ms") or match["unit"] == "ms" else 1.0
+                parts = (match[part] for part in ("hours", "minutes", "number"))
+                hours, minutes, number = (float(part or 0) for part in parts)
+                seconds = 3600.0 * hours + 60.0 * minutes + scale * number
             else:
                 until, now = parsedate_to_datetime(text).replace(tzinfo=UTC), datetime.now(UTC)
-                with suppress(
-                    ValueError
-                ):  # by the server's clock where it says: ours may be wrong
+                # By the server's clock where it says: ours may be wrong.
+                with suppress(ValueError):
                     now = parsedate_to_datetime(fields.get("date", "")).replace(tzinfo=UTC)
                 seconds = (until - now).total_seconds()  # HTTP knows GMT alone
         except (ValueError, OverflowError):

@@ -209,7 +209,14 @@ def test_what_does_not_pass_by_waiting_is_not_asked_for_again(row: dict[str, Any
 @pytest.mark.parametrize("what", ["capacity", "GPU memory", "resources"])
 def test_what_a_server_lacks_for_a_while_is_asked_for_again(what: str) -> None:
     body = {"error": {"message": f"The cluster has insufficient {what} at the moment."}}
-    assert fault_of(503, body).retryable
+    assert all(fault_of(status, body).retryable for status in (424, 498, 499, 503))
+
+
+def test_what_a_model_wrote_in_no_form_is_its_answer() -> None:
+    body = {"error": {"message": "No JSON schema.", "code": "json_validate_failed"}}
+    body["error"]["failed_generation"] = '{"block": {'
+    sent = {"response_format": {"type": "json_schema"}}
+    assert fault_of_status(400, body, {}, sent=sent) == Reply(text='{"block": {')
 
 
 @pytest.mark.parametrize("code", [400, "402", "invalid_api_key", "model_not_found"])
@@ -292,6 +299,7 @@ def test_the_wait_asked_for_has_three_forms() -> None:
                 **{"Please try again in 8s": 8.0, "Please try again in 612ms": 0.612},
                 **{"Please retry in 34.07s": 34.07, "Try again in 7m12.5s": 432.5},
                 **{"Please retry after 12 seconds": 12.0, "wait 1 minute": 60.0},
+                **{"Please try again in 2h13m11.5s. Need more tokens?": 7991.5},
             }.items()
         ),
         *(
