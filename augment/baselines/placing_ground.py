@@ -25,6 +25,7 @@ _GAP_M = 1.5
 _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
+_ABREAST_M, _ABREAST_TRIES = 0.01, 8
 
 
 class PlacingGround:
@@ -84,6 +85,13 @@ class PlacingGround:
         if place is None:
             words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
             raise CannotPlace(f"The map has no {words} beside the ego's lane there.")
+        sign = -1.0 if lane is LaneChoice.ONCOMING else 1.0
+        for _ in range(_ABREAST_TRIES):
+            # Where the lane runs at an angle to the way, its nearest point is not abreast.
+            off_m = distance_m - self.route.locate(*place.pose.beside(0.0)).ahead_m
+            if abs(off_m) < _ABREAST_M:
+                break
+            place = self.graph.along(place.lane_id, place.s_m, sign * off_m) or place
         return place
 
     def neighbour(self, place: LanePosition, side: Side) -> str | None:

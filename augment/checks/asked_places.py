@@ -67,8 +67,7 @@ def _measure_ahead(case: Case, party: Party, wanted: Bounds) -> tuple[TrafficAge
     request = party.request
     # The first is the nearest to the ego: behind it, who is furthest ahead.
     sign = -1.0 if request.spot.relation is wish.Relation.BEHIND else 1.0
-    agents = [*party.placed, *party.spare]
-    ahead = [(case.ahead_m(agent), agent) for agent in agents]
+    ahead = [(case.ahead_m(agent), agent) for agent in (*party.placed, *party.spare)]
     first_m, first = min(ahead, key=lambda item: (sign * item[0], item[1].id))
     if _is_ring(party):
         return first, sum(value for value, _ in ahead) / len(ahead)
@@ -176,6 +175,12 @@ def _cones(case: Case, party: Party, request: wish.ConesRequest, band: Band) -> 
         wanted = Bounds(edge_m, edge_m, max(case.tolerances.across_m, CONE_M))
     everyone = [*cones, *party.workers]
     yield _across(everyone, middle_m, wanted, subject="the middle of the cones")
+    along_m = case.ahead_m(cones[-1]) - case.ahead_m(cones[0])
+    leads_along, is_row = along_m > max(lefts) - min(lefts), request.shape is wish.Shape.ROW
+    is_straight = is_row or (request.shape is wish.Shape.LINE and not request.both_sides)
+    if is_straight and party.is_exact and len(cones) > 1 and leads_along is is_row:
+        words = f"The cones are to stand {'across' if is_row else 'along'} the lane."
+        yield find(FindingKind.ASKED_ACROSS, False, everyone, words)
     if is_line:
         return
     if request.ends_in_middle and party.is_exact:
@@ -209,8 +214,8 @@ def check_spacing(case: Case) -> Iterator[Finding]:
 
 def _in_row(case: Case, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
     """From centre to centre, straight or along the ego's lane: whichever is nearer to the wish."""
-    things = party.agents
-    if spacing is None or not party.is_exact or len(things) < 2:
+    things, is_double = party.agents, getattr(party.request, "both_sides", False)
+    if spacing is None or not party.is_exact or len(things) < 2 + is_double:
         return
     # Who stands in another is a fault of its own, which leaves gaps elsewhere.
     if any(apart_m(thing, other) <= thing.width_m for thing, other in combinations(things, 2)):
@@ -219,10 +224,11 @@ def _in_row(case: Case, party: Party, spacing: wish.Length | None) -> Iterator[F
     straight_m = median(
         min(apart_m(thing, other) for other in things if other is not thing) for thing in things
     )
-    stations_m = sorted(case.ahead_m(thing) for thing in things)
+    stations_m = sorted(case.ahead_m(thing) for thing in things)[:: 1 + is_double]
     along_m = median(after - before for before, after in pairwise(stations_m))
     wanted = case.gap(spacing)
-    gap_m = min(straight_m, along_m, key=wanted.off)
+    # Along both boundaries of a lane each one's neighbour stands across it.
+    gap_m = along_m if is_double else min(straight_m, along_m, key=wanted.off)
     what = "The gap between neighbours in the row of {agents[0]}"
     yield hold(FindingKind.ASKED_SPACING, things, what, gap_m, wanted)
 

@@ -17,7 +17,7 @@ from augment.geometry.frames import difference
 from augment.scene import entities
 from augment.scene import intent as intents
 from augment.scene.ego_route import EgoRoute, RoutePosition
-from augment.scene.lane_graph import Beside, LanePosition, best_aligned
+from augment.scene.lane_graph import Beside, LanePosition
 from augment.scene.presets import find_crossing
 
 _SAME_LANE_M = 1.0
@@ -124,14 +124,13 @@ class LanesAcross:
 
     def _find_band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         tangent_rad = self.route.heading_at(ahead_m)
-        near = self.route.graph.beside(*self.route.position(ahead_m))
         if choice is intents.LaneChoice.OWN:
-            own = best_aligned([lane for lane in near if lane.covers], tangent_rad)
+            own = self.route.lane_position(ahead_m)
             if own is None:
                 return None
-            return Band(
-                lane_id=own.lane_id, left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad
-            )
+            width_m = self.route.graph.lane(own.lane_id).width_m
+            return Band(lane_id=own.lane_id, left_m=0.0, width_m=width_m, tangent_rad=tangent_rad)
+        near = self.route.graph.beside(*self.route.position(ahead_m))
         # The nearest, and at a joint the one that has not ended.
         beside = sorted(near, key=lambda lane: (round(abs(lane.d_m), 2), lane.beyond_m))
         bands = (band for lane in beside if (band := _band(lane, tangent_rad, choice)))

@@ -81,32 +81,27 @@ class Role(StrEnum):
     CAR = "car"
     BUS = "bus"
     BICYCLE = "bicycle"
-    WALKER = "pedestrian"
-    CONE = "traffic cone"
+    PEDESTRIAN = "pedestrian"
+    TRAFFIC_CONE = "traffic cone"
     WORKER = "worker"
     BARRIER = "barrier"
-    SIGN = "construction sign"
+    CONSTRUCTION_SIGN = "construction sign"
     DOOR = "door"
 
     def suits(self, agent: TrafficAgent) -> bool:
         """Return whether an agent's type is right."""
         if self is Role.BUS and agent.length_m >= LONG_VEHICLE_M:
             return agent.type in _TYPES[Role.VEHICLE]
-        return agent.type in _TYPES[self]
+        return agent.type in (_TYPES.get(self) or (AgentType[self.name],))
 
 
 _TYPES = {
     Role.VEHICLE: (AgentType.VEHICLE, AgentType.BUS),
     Role.CAR: (AgentType.VEHICLE,),
-    Role.BUS: (AgentType.BUS,),
-    Role.BICYCLE: (AgentType.BICYCLE,),
-    Role.WALKER: (AgentType.PEDESTRIAN,),
-    Role.CONE: (AgentType.TRAFFIC_CONE,),
     Role.WORKER: (AgentType.PEDESTRIAN,),
-    Role.BARRIER: (AgentType.BARRIER,),
-    Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
     Role.DOOR: (AgentType.GENERIC_OBJECT,),
 }
+"""Of roles that are called otherwise than a type."""
 _MISTYPED_M = 1e6
 """More than any distance."""
 _ROLES = {wish.Body.VAN: Role.CAR, wish.Body.TRUCK: Role.CAR}
@@ -185,8 +180,8 @@ def match_to_requests(
 
 def _roles(request: wish.Request, added: Sequence[TrafficAgent]) -> list[Role]:
     """Return the roles of a request; an open count is the number there is, at least one."""
-    kinds = {wish.WalkRequest: Role.WALKER, wish.DoorRequest: Role.DOOR}
-    role = kinds.get(type(request), Role.CONE)
+    kinds = {wish.WalkRequest: Role.PEDESTRIAN, wish.DoorRequest: Role.DOOR}
+    role = kinds.get(type(request), Role.TRAFFIC_CONE)
     if isinstance(request, wish.VehicleRequest | wish.CrashRequest):
         role = _ROLES.get(request.body) or Role(request.body.value)
     count = request.count or max(sum(role.suits(agent) for agent in added), 1)

@@ -24,8 +24,8 @@ WIDEST_M, LONGEST_TTC_S = 8.0, 3.0
 # Beside the route; before the ego and past the furthest change; ahead where nothing changed.
 _ASIDE_M, _BEYOND_M, _LOOKS_M = 15.0, 10.0, 60.0
 _SETS_OUT_WITHIN_M = 2.0
-# Of 8 m, down to 2 mm.
-_HALVINGS = 12
+# Of 8 m, down to 2 mm; as much of an arc's chords comes on top.
+_HALVINGS, _EXACT_M = 12, 0.005
 
 
 def check_purpose(case: Case) -> Iterator[Finding]:
@@ -45,7 +45,7 @@ def check_purpose(case: Case) -> Iterator[Finding]:
             words = "Nobody on foot who gets into the ego's way is hidden from it at first."
             yield find(FindingKind.PURPOSE, False, changed, words)
     if purpose.passage is not None:
-        wanted = Bounds(purpose.passage.low_m, purpose.passage.high_m, 0.0)
+        wanted = Bounds(purpose.passage.low_m, purpose.passage.high_m, _EXACT_M)
         what = "The width of the widest way past"
         yield hold(FindingKind.PURPOSE, changed, what, measure_passage(situation), wanted)
 

@@ -288,7 +288,8 @@ class _Fitting:
             side = request.start
             if side is None or request.motion is None:
                 return ends[0] * ACROSS_M, ends[-1] * ACROSS_M
-            edge_m = find_road_edge_m(lanes.route, ahead_m, side.sign)  # there he waits
+            # There he waits; a side road has no edge on it, so anywhere on that side.
+            edge_m = find_road_edge_m(lanes.route, ahead_m, side.sign) % ACROSS_M
             low_m, high_m = sorted((side.sign * edge_m, side.sign * (edge_m + ACROSS_M)))
             return low_m, high_m
 

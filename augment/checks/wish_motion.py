@@ -300,7 +300,7 @@ def _find_ramp(case: MotionCase, wish: MotionWish) -> _Ramp:
     to_mps = case.own.speeds[-1][1] if case.own.speeds else from_mps
     if wish.speed_mps is not None:
         to_mps = _shift(to_mps, 0.0, (wish.speed_mps.low, wish.speed_mps.high))
-    elif slows or from_mps > 0.0:
+    elif slows or not case.placed.is_stopped:
         to_mps = 0.0 if slows else from_mps
     limits = LIMITS.get(case.placed.type)
     # Who has no limits may change its speed at once.
@@ -410,7 +410,5 @@ def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterat
 def _takes_s(speeds: Sequence[tuple[float, float]], way_m: float) -> float:
     """Return how long somebody who stands takes for so many metres."""
     times_s = np.arange(0.0, _FURTHER_S, STEP_S).tolist()
-    gone_m = (way_and_speed(tuple(speeds), 0.0, time_s)[0] for time_s in times_s)
-    return next(
-        (time_s for time_s, at_m in zip(times_s, gone_m, strict=True) if at_m >= way_m), _FURTHER_S
-    )
+    enough_m, row = way_m - _NONE_M, tuple(speeds)
+    return next((t for t in times_s if way_and_speed(row, 0.0, t)[0] >= enough_m), _FURTHER_S)

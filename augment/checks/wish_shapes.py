@@ -170,7 +170,7 @@ def find_worker_ground(
     normal, begin = ahead, first
     if request.post_side is not None:
         normal = request.post_side.sign * np.array([-ahead[1], ahead[0]])
-        begin = (first + last) / 2.0
+        begin = near.mean(axis=0)
     elif request.post is not wish.Post.BEHIND:
         return ground
     elif not is_along:
@@ -279,10 +279,8 @@ def _straighten(
 
 def _position(lanes: LanesAcross, lane: wish.LaneChoice, spot: Placement) -> Point:
     ahead_m, left_m = spot
-    if lane is not wish.LaneChoice.OWN:
-        band = lanes.band(lane, ahead_m)
-        left_m += 0.0 if band is None else band.left_m
-    return lanes.route.position(ahead_m, left_m)
+    band = lanes.band(lane, ahead_m)
+    return lanes.route.position(ahead_m, left_m + (0.0 if band is None else band.left_m))
 
 
 def _total_m(points: FloatArray, placed: FloatArray) -> float:

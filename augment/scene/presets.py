@@ -75,7 +75,7 @@ USUAL = {
 }
 """The numbers of each where nobody says, the start apart of those that find it out.
 
-Whoever drives faster than the usual speed keeps its own.
+Who drives and changes lanes or runs a red light keeps its own speed.
 """
 
 
@@ -198,8 +198,8 @@ class _Case:
 
     @property
     def reached_mps(self) -> float:
-        own_mps = self.agent.speed_mps if self.numbers.speed_mps is None else 0.0
-        return max(self.number("speed_mps"), own_mps)
+        holds = self.numbers.speed_mps is None and not self.agent.is_stopped
+        return self.agent.speed_mps if holds else self.number("speed_mps")
 
     def require(self, *, ahead: bool = True, drives: bool | None = None) -> None:
         walks = self.preset is MotionPreset.LATE_PEDESTRIAN

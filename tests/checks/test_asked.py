@@ -126,6 +126,10 @@ def test_what_is_as_asked_for_has_no_fault() -> None:
         (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=-7.0)), FindingKind.ASKED_SPACING),
         (cones(20.0, 3, wish.Shape.TAPER, start=wish.Side.LEFT), TAPER[:3],
          FindingKind.ASKED_SIDE),
+        (cones(20.0, 2, wish.Shape.ROW), (cone("Agent2", 20.0, 0.2), cone("Agent3", 21.0, 0.0)),
+         FindingKind.ASKED_ACROSS),
+        (cones(20.0, 2, wish.Shape.LINE), (cone("Agent2", 20.0, 0.5), cone("Agent3", 20.4, -0.5)),
+         FindingKind.ASKED_ACROSS),
     ],
 )  # fmt: skip
 def test_what_is_not_as_asked_for_is_the_one_fault(

@@ -156,9 +156,7 @@ def test_who_runs_a_red_light_comes_as_the_ego_does_and_from_the_side_that_is_as
     # The ego is at the crossing after 40 m at 8 m/s: 5 s, 30 m at 6 m/s.
     assert (agent.x_m, agent.y_m, agent.lane_id) == (40.0, -30.0, "Lane8")
     assert agent.motion == PlannedMotion(
-        path=LanePath(lane_ids=("Lane8", "Connector1", "Lane9")),
-        speeds=((0.67, 8.0),),
-        start=AtTime(after_s=1.0),
+        path=LanePath(lane_ids=("Lane8", "Connector1", "Lane9")), start=AtTime(after_s=1.0)
     )
     with pytest.raises(CannotPlace, match="from the left"):
         place(base, added({"preset": "red_light", "side": "left"}))

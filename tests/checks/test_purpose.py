@@ -65,6 +65,7 @@ def test_off_the_map_nothing_is_measured() -> None:
 
 
 WIDE = Intent(purpose=Purpose(passage=Length(low_m=2.0, high_m=4.3)))
+EXACT = Intent(purpose=Purpose(passage=Length(low_m=4.25, high_m=4.25)))
 HIDDEN = Intent(purpose=Purpose(sight=Length(low_m=9.0, high_m=10.0)))
 ACROSS = vehicle("A", 30.0, 0.0, 1.0)
 
@@ -73,6 +74,7 @@ ACROSS = vehicle("A", 30.0, 0.0, 1.0)
     ("intent", "added", "words"),
     [
         (WIDE, [vehicle("A", 30.0, 0.0)], []),
+        (EXACT, [vehicle("A", 30.0, 0.0)], []),
         (WIDE, [], ["past is 7.00 m; 2 to 4.3 m is asked for."]),
         (WIDE, [vehicle("A", 30.0, -1.0)], ["past is 5.25 m; 2 to 4.3 m is asked for."]),
         (WIDE, [ACROSS], []),  # that it stands across is nobody's fault: nothing forbids it

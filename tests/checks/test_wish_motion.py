@@ -10,10 +10,12 @@ from typing import Any
 
 import pytest
 
+from augment.baselines.rule_placer import place
 from augment.checks import FindingKind, Ground, Severity
 from augment.checks.registry import check_against_intent
 from augment.checks.wish import measure_wish
 from augment.metrics.displacement import displacement
+from augment.scene.codec import intent_from_parts
 from augment.scene.entities import (
     AgentType,
     InterplanRules,
@@ -22,11 +24,18 @@ from augment.scene.entities import (
     TrafficAgent,
 )
 from augment.scene.intent import Intent, VehicleRequest
-from augment.scene.intent_parts import Amount, StartWish
-from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, PointPath
+from augment.scene.intent_parts import Amount, MotionWish, StartWish
+from augment.scene.planned_motion import (
+    AtTime,
+    LanePath,
+    MotionPreset,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+)
 from augment.simulation.expected import expect_recording
 from tests.checks.worlds import faults_against
-from tests.fixtures.shelf import ROUNDED_M, entry, shown_scene
+from tests.fixtures.shelf import ROUNDED_M, entry, shown_scene, whole_scene
 from tests.scenes import vehicle
 
 CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
@@ -252,6 +261,60 @@ def test_by_interplans_rules_a_bus_without_a_motion_runs_no_red_light() -> None:
     assert FindingKind.ASKED_CROSSING in [one.kind for one in findings if one.is_fault]
     measured = measure_wish(ground, change, authored.intent)
     assert measured.matches[0].distance_m > 1.0
+
+
+def _ahead(low_m: float, lane: str | None = "own", **more: Any) -> dict[str, Any]:
+    return {"distance": {"low_m": low_m}, "relation": "ahead", "lane": lane} | more
+
+
+_LINE = {"kind": "cones", "shape": "line", "spacing": {"low_m": 5.0}}
+_BRAKES = {"preset": "hard_braking", "start": {"after_s": {"low": 1.5}}}
+_PARKED: dict[str, Any] = {"kind": "parked vehicle"}
+
+
+@pytest.mark.parametrize(
+    ("name", "request_"),
+    [
+        # Connectors part under it, lanes beside it run at an angle, and a side road has no edge.
+        ("market-crossing", {"spot": _ahead(24.0), "speed_mps": 10.0, "motion": _BRAKES}),
+        ("theatre-crossing", {"spot": _ahead(33.0, "oncoming"), "speed_mps": 0.0}),
+        ("chapel-corner", {"kind": "walk", "start": "right", "spot": _ahead(34.0, None),
+                           "motion": {"preset": "late_pedestrian"}}),
+        ("station-cross", {"body": "bus", "speed_mps": 7.0,
+                           "motion": {"preset": "red_light", "side": "left"}}),
+        ("willow-crescent", {"kind": "door", "spot": {"landmark": _PARKED}}),
+        ("station-cross", _LINE | {"spot": _ahead(20.0), "count": 3, "both_sides": True}),
+        ("theatre-crossing", _LINE | {
+            "spot": _ahead(20.0, lateral={"target": "left lane boundary"}), "count": 4,
+            "has_worker": True, "post": "beside the last cones", "post_side": "left"}),
+    ],
+)  # fmt: skip
+def test_what_is_placed_where_ways_part_and_bend_is_what_was_asked_for(
+    name: str, request_: dict[str, Any]
+) -> None:
+    intent = intent_from_parts({"requests": [{"kind": "vehicles", "count": 1} | request_]})
+    scene = whole_scene(name)
+    change = place(scene, intent).modification
+    found = measure_wish(Ground.of(scene), change, intent)
+    assert found is not None
+    assert max(found.distances_m) <= ROUNDED_M
+    assert not [one for one in faults_against(scene, change, intent) if "asked" in one.kind]
+
+
+def test_who_is_recorded_as_creeping_pulls_out_as_one_who_stands() -> None:
+    slug = "pull-out-lime-street"
+    base, authored = shown_scene(slug), entry(slug)
+    assert authored.intent
+    assert authored.reference
+    (made,), (asks,) = authored.reference.moved, authored.intent.moves
+    assert made.motion
+    agents = (replace(a, speed_mps=0.05) if a.id == made.id else a for a in base.agents)
+    scene = replace(base, agents=tuple(agents))
+    made = replace(made, speed_mps=0.05, motion=replace(made.motion, start=AtTime()))
+    wish = Intent(moves=(replace(asks, motion=MotionWish(preset=MotionPreset.PULL_OUT)),))
+    found = measure_wish(Ground.of(scene), Modification(moved=(made,)), wish)
+    assert found is not None
+    assert max(found.distances_m) <= 0.1
 
 
 def test_who_never_begins_is_off_by_a_number_where_any_moment_is_right() -> None:
